@@ -1,0 +1,40 @@
+"""The table of robots, open to robots from outside the package."""
+
+from __future__ import annotations
+
+from omni_envs.errors import InvalidDataError, UnknownNameError
+from omni_envs.robots.g1 import G1
+from omni_envs.robots.robot import Robot
+
+_ROBOTS: dict[str, Robot] = {G1.name: G1}
+
+
+def robot_names() -> tuple[str, ...]:
+    """Returns the names of all registered robots."""
+    return tuple(_ROBOTS)
+
+
+def get_robot(name: str | Robot) -> Robot:
+    """Looks a robot up by name; a ``Robot`` is returned as it is.
+
+    Raises:
+        UnknownNameError: No robot of that name is registered.
+    """
+    if isinstance(name, Robot):
+        return name
+    robot = _ROBOTS.get(str(name).lower())
+    if robot is None:
+        raise UnknownNameError("robot", name, robot_names())
+    return robot
+
+
+def register_robot(robot: Robot) -> Robot:
+    """Adds a robot to the table, so that its name works everywhere.
+
+    Raises:
+        InvalidDataError: Another robot has that name.
+    """
+    if _ROBOTS.get(robot.name, robot) is not robot:
+        raise InvalidDataError("Robot registry", "name", "unused", f"{robot.name!r} twice")
+    _ROBOTS[robot.name] = robot
+    return robot

@@ -1,0 +1,21 @@
+"""What stands around the robot, and the one builder that turns it into a MuJoCo model."""
+
+from omni_envs.scenes.build import GROUND, OBJECT, TERRAIN, PhysicsOptions, build_spec
+from omni_envs.scenes.scene import Scene, SceneObject, Terrain
+from omni_envs.scenes.shapes import Box, ConvexMesh, Part, Shape, load_convex_parts
+
+__all__ = [
+    "GROUND",
+    "OBJECT",
+    "TERRAIN",
+    "Box",
+    "ConvexMesh",
+    "Part",
+    "PhysicsOptions",
+    "Scene",
+    "SceneObject",
+    "Shape",
+    "Terrain",
+    "build_spec",
+    "load_convex_parts",
+]

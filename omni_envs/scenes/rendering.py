@@ -1,0 +1,182 @@
+"""Offscreen pictures of a robot in a scene, with translucent ghosts of its reference."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+# Without a display GLFW aborts the interpreter; EGL renders headless. MuJoCo reads this at import.
+if sys.platform == "linux" and "DISPLAY" not in os.environ:
+    os.environ.setdefault("MUJOCO_GL", "egl")
+
+import mujoco
+import numpy as np
+
+from omni_envs.robots import Robot
+from omni_envs.scenes.build import LOOKS, OBJECT, PHYSICS_ONLY, build_spec
+from omni_envs.scenes.scene import Scene
+
+_GHOST_RGBA = (0.25, 0.62, 0.95, 0.35)
+_SKY_RGB = (0.93, 0.95, 0.97)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A free camera that looks at a point.
+
+    Attributes:
+        azimuth: Degrees about z; 90 looks along +y.
+        elevation: Degrees; negative looks down.
+        distance: m from the point.
+        look_at: The point, m; None follows the robot's root, at ``height``.
+        height: Height of the followed point, m.
+    """
+
+    azimuth: float = 125.0
+    elevation: float = -14.0
+    distance: float = 2.8
+    look_at: tuple[float, float, float] | None = None
+    height: float = 0.6
+
+
+class SceneRenderer:
+    """Renders poses of a robot and its object; ghosts show other poses of the same.
+
+    The rendered model is separate from any simulated one: only poses go in.
+
+    Args:
+        robot: The robot.
+        scene: Its scene.
+        ghosts: How many ghosts can be shown at once.
+        width: Pixels.
+        height: Pixels.
+    """
+
+    def __init__(
+        self, robot: Robot, scene: Scene, *, ghosts: int = 1, width: int = 640, height: int = 480
+    ) -> None:
+        self.width, self.height = width, height
+        self._nq = robot.nq
+        self._has_object = scene.object is not None
+        self._model = _visual_model(build_spec(robot, scene), width, height)
+        self._data = mujoco.MjData(self._model)
+        ghost_spec = build_spec(robot, Scene(object=scene.object))
+        ghost_spec.delete(ghost_spec.geom("ground"))
+        self._ghost_model = _visual_model(ghost_spec, width, height)
+        self._ghost_model.geom_matid[:] = -1
+        self._ghost_model.geom_rgba[:] = _GHOST_RGBA
+        self._ghosts = [mujoco.MjData(self._ghost_model) for _ in range(ghosts)]
+        self._renderer = mujoco.Renderer(self._model, height, width, max_geom=4000)
+        self._option = mujoco.MjvOption()
+        mujoco.mjv_defaultOption(self._option)
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[[0, LOOKS]] = 1
+
+    def render(
+        self,
+        qpos: np.ndarray,
+        object_pose: np.ndarray | None = None,
+        *,
+        ghost_qpos: Sequence[np.ndarray] | np.ndarray | None = None,
+        ghost_object_pose: Sequence[np.ndarray] | np.ndarray | None = None,
+        camera: Camera | None = None,
+        points: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Renders one picture.
+
+        Args:
+            qpos: (nq,) robot pose.
+            object_pose: (7,) object position and quaternion wxyz.
+            ghost_qpos: (nq,) or (G, nq) ghost poses.
+            ghost_object_pose: (7,) or (G, 7) ghost object poses; without them ghosts carry no object.
+            camera: Where to look from; the default follows the robot.
+            points: (P, 3) points shown as small red spheres, e.g. human keypoints.
+
+        Returns:
+            (height, width, 3) uint8 picture.
+        """
+        _pose(self._model, self._data, qpos[: self._nq], object_pose if self._has_object else None)
+        camera = camera or Camera()
+        view = mujoco.MjvCamera()
+        view.azimuth, view.elevation = camera.azimuth, camera.elevation
+        view.distance = camera.distance
+        view.lookat = (
+            (qpos[0], qpos[1], camera.height) if camera.look_at is None else camera.look_at
+        )
+        self._renderer.update_scene(self._data, view, self._option)
+        scene = self._renderer.scene
+        if ghost_qpos is not None:
+            poses = np.atleast_2d(ghost_qpos)
+            objects = None if ghost_object_pose is None else np.atleast_2d(ghost_object_pose)
+            for i, (data, pose) in enumerate(zip(self._ghosts, poses, strict=False)):
+                shown = objects[i] if objects is not None and self._has_object else None
+                _pose(self._ghost_model, data, pose[: self._nq], shown)
+                mujoco.mjv_addGeoms(
+                    self._ghost_model,
+                    data,
+                    self._option,
+                    mujoco.MjvPerturb(),
+                    mujoco.mjtCatBit.mjCAT_DYNAMIC,
+                    scene,
+                )
+        for point in () if points is None else points:
+            geom = scene.geoms[scene.ngeom]
+            mujoco.mjv_initGeom(
+                geom,
+                mujoco.mjtGeom.mjGEOM_SPHERE,
+                np.full(3, 0.018),
+                np.asarray(point, float),
+                np.eye(3).ravel(),
+                np.array([0.9, 0.2, 0.15, 1.0], np.float32),
+            )
+            scene.ngeom += 1
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Frees the graphics context."""
+        self._renderer.close()
+
+
+def _visual_model(spec: mujoco.MjSpec, width: int, height: int) -> mujoco.MjModel:
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
+    spec.visual.quality.shadowsize = 4096
+    spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
+    spec.visual.headlight.diffuse = (0.45, 0.45, 0.45)
+    spec.visual.headlight.specular = (0.1, 0.1, 0.1)
+    spec.visual.map.fogstart, spec.visual.map.fogend = 8.0, 25.0
+    spec.visual.rgba.fog = (*_SKY_RGB, 1.0)
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=_SKY_RGB,
+        rgb2=(0.75, 0.82, 0.90),
+        width=64,
+        height=64,
+    )
+    spec.worldbody.add_light(
+        pos=(1.5, -2.0, 5.0),
+        dir=(-0.25, 0.35, -1.0),
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        castshadow=True,
+        diffuse=(0.55, 0.55, 0.55),
+    )
+    # Robot geoms that only collide are not looked at; what a scene shows is in group 0.
+    for geom in list(spec.geoms):
+        if LOOKS < geom.group <= PHYSICS_ONLY:
+            spec.delete(geom)
+    return spec.compile()
+
+
+def _pose(
+    model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray, object_pose: np.ndarray | None
+) -> None:
+    data.qpos[: len(qpos)] = qpos
+    if model.nmocap:
+        mocap = int(model.body(OBJECT).mocapid[0])
+        # An absent object is parked below the ground.
+        pose = (0, 0, -50, 1, 0, 0, 0) if object_pose is None else object_pose
+        data.mocap_pos[mocap], data.mocap_quat[mocap] = pose[:3], pose[3:7]
+    mujoco.mj_forward(model, data)
