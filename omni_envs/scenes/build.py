@@ -19,8 +19,8 @@ TERRAIN = "terrain"
 # Geom groups of a robot's MJCF (see ``Robot.mjcf``).
 LOOKS, COLLISION, KINEMATICS_ONLY, PHYSICS_ONLY = 2, 3, 4, 5
 
-# Collision bits. Robot geoms meet each other and the environment; environment geoms do not meet each
-# other, but the object meets ground and terrain.
+# Collision bits. Robot geoms meet each other and the environment; environment geoms do not meet
+# each other, but the object meets ground and terrain.
 _ROBOT_BIT, _ENVIRONMENT_BIT = 1, 2
 
 _GROUND_RGB, _GROUND_RGB2 = (0.86, 0.88, 0.90), (0.80, 0.82, 0.85)
@@ -56,8 +56,8 @@ def build_spec(
     Args:
         robot: The robot, or None for the scene alone.
         scene: Ground, object and terrain.
-        physics: None builds for kinematics: the object is a mocap body, no actuation is used, robot geoms of
-            group 5 are removed. With options the object is a free body (joint ``object``), robot geoms of
+        physics: None builds for kinematics: the object is a mocap body, robot geoms of group 5 are
+            removed. With options the object is a free body (joint ``object``), robot geoms of
             group 4 are removed.
         looks: Keep the visual-only geoms (group 2). Drop them where nothing is rendered.
 

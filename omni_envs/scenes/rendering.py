@@ -90,7 +90,7 @@ class SceneRenderer:
             qpos: (nq,) robot pose.
             object_pose: (7,) object position and quaternion wxyz.
             ghost_qpos: (nq,) or (G, nq) ghost poses.
-            ghost_object_pose: (7,) or (G, 7) ghost object poses; without them ghosts carry no object.
+            ghost_object_pose: (7,) or (G, 7) ghost object poses; without, ghosts carry none.
             camera: Where to look from; the default follows the robot.
             points: (P, 3) points shown as small red spheres, e.g. human keypoints.
 

@@ -20,7 +20,7 @@ def _surface(parts: tuple[Part, ...]) -> trimesh.Trimesh:
 def _scaled(parts: tuple[Part, ...], scale: float | np.ndarray) -> tuple[Part, ...]:
     scale = np.broadcast_to(np.asarray(scale, float), 3)
     if not np.allclose(scale, scale[0]):
-        # A rotated part would shear under a per-axis scale: scale its vertices in the owner's frame.
+        # A rotated part shears under a per-axis scale: scale its vertices in the owner's frame.
         parts = tuple(
             p
             if p.quaternion == (1.0, 0.0, 0.0, 0.0)

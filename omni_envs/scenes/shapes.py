@@ -86,8 +86,8 @@ class Part:
 def load_convex_parts(path: str | Path, max_volume_error: float = 0.05) -> tuple[Part, ...]:
     """Loads a mesh file whose connected pieces are each convex.
 
-    Every connected piece becomes one convex part. A piece is taken as convex when its hull is at most
-    ``max_volume_error`` larger than itself.
+    Every connected piece becomes one convex part. A piece is taken as convex when its hull is at
+    most ``max_volume_error`` larger than itself.
 
     Args:
         path: OBJ, STL, PLY or any other format that trimesh reads.
@@ -121,7 +121,7 @@ def load_convex_parts(path: str | Path, max_volume_error: float = 0.05) -> tuple
             raise FileFormatError(
                 path,
                 f"piece {i}",
-                f"a convex piece (hull at most {max_volume_error:.0%} larger); split it into convex pieces",
+                f"a convex piece (its hull at most {max_volume_error:.0%} larger than itself)",
                 f"a hull {hull.volume / abs(piece.volume) - 1:.0%} larger",
             )
         parts.append(Part(ConvexMesh(np.array(hull.vertices), np.array(hull.faces))))
