@@ -1,0 +1,133 @@
+"""One frame: sequential quadratic programming, then restoration on true distances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mink.tasks import BaseTask
+
+from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
+from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
+from omni_envs.retargeting.options import RetargetOptions
+from omni_envs.retargeting.proximal_task import ProximalTask
+from omni_envs.retargeting.qp import StepQP, step_bounds, step_objective, step_rows
+from omni_envs.retargeting.solver import StepSolver
+
+_KINDS = (STANCE, SELF, CONTACT)
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """A solved frame.
+
+    Attributes:
+        q: (nq,) configuration.
+        iterations: Quadratic programs solved.
+        violations: Remaining violation of stance, self-collision and non-penetration, m.
+        soft: Constraints had to give way in the last step.
+    """
+
+    q: np.ndarray
+    iterations: int
+    violations: tuple[float, float, float]
+    soft: bool
+
+
+class FrameSolver:
+    """Solves single frames with a fixed set of tasks and limits.
+
+    Args:
+        configuration: Kinematics that tasks and limits are evaluated on.
+        mesh: The interaction mesh task.
+        others: All other tasks.
+        bounds: Limits on dq.
+        rows: Limits on linear combinations of dq.
+        solver: Solver of a step.
+        options: Settings.
+    """
+
+    def __init__(
+        self,
+        configuration: Kinematics,
+        mesh: InteractionMeshTask,
+        others: list[BaseTask],
+        bounds: list[BoundLimit],
+        rows: list[RowLimit],
+        solver: StepSolver,
+        options: RetargetOptions,
+    ) -> None:
+        self.configuration = configuration
+        self.tasks: list[BaseTask] = [mesh, *others]
+        self.bounds = bounds
+        self.row_limits = rows
+        self.solver = solver
+        self.options = options
+        self._mesh = mesh
+        self._weight = options.laplacian_weight
+
+    def solve(self, q: np.ndarray, iterations: int, radius: float) -> FrameResult:
+        """Minimises the tasks from a starting configuration, then restores feasibility.
+
+        Args:
+            q: (nq,) start.
+            iterations: Most steps.
+            radius: Trust region of a step.
+        """
+        configuration, soft, steps = self.configuration, False, 0
+        configuration.update(q)
+        predicted = np.inf
+        while steps < iterations:
+            qp = self._program(radius)
+            before = self._cost()
+            dq, soft = self.solver(qp)
+            configuration.update(configuration.step(dq))
+            steps += 1
+            last, predicted = predicted, before + qp.decrease(dq)
+            if abs(predicted - last) <= self.options.convergence * abs(predicted):
+                break
+        repairs, violations, repair_soft = self._restore()
+        q = configuration.data.qpos.copy()
+        return FrameResult(q, steps + repairs, violations, soft or repair_soft)
+
+    def _cost(self) -> float:
+        """Half the weighted cost of the current configuration."""
+        cost = 0.5 * self._weight * self._mesh.energy(self.configuration)
+        for task in self.tasks:
+            if isinstance(task, ProximalTask):
+                cost += task.cost(self.configuration)
+        return cost
+
+    def _program(self, radius: float) -> StepQP:
+        H, g = step_objective(self.configuration, self.tasks)
+        lower, upper = step_bounds(self.configuration, self.bounds)
+        rows = step_rows(self.configuration, self.row_limits)
+        return StepQP(H, g, lower, upper, rows, self.configuration.metric, radius)
+
+    def _restore(self) -> tuple[int, tuple[float, float, float], bool]:
+        """Shortest steps onto the true constraints, which linearisation may have left violated."""
+        configuration, soft = self.configuration, False
+        metric = configuration.metric
+        for repairs in range(self.options.restoration_iterations + 1):
+            rows = step_rows(configuration, self.row_limits)
+            violations = _violations(rows)
+            if (
+                max(violations) <= self.options.restoration_tolerance
+                or repairs == self.options.restoration_iterations
+            ):
+                break
+            lower, upper = step_bounds(configuration, self.bounds)
+            zero = np.zeros(len(metric))
+            dq, soft = self.solver(
+                StepQP(np.diag(metric), zero, lower, upper, rows, metric, np.inf)
+            )
+            configuration.update(configuration.step(dq))
+        return repairs, violations, soft
+
+
+def _violations(rows: Rows) -> tuple[float, float, float]:
+    """Largest violation at dq = 0 by kind."""
+    excess = np.maximum(rows.lower, -rows.upper)
+    stance, own, contact = (float(excess[rows.kind == k].max(initial=0.0)) for k in _KINDS)
+    return stance, own, contact

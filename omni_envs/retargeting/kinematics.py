@@ -1,0 +1,157 @@
+"""Kinematics of a robot in a scene: all points and Jacobians of a configuration at once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import mink
+import mujoco
+import numpy as np
+
+from omni_envs.robots import KEYPOINTS, SIDES, Robot
+from omni_envs.robots.self_collision import resting_pairs
+from omni_envs.scenes import OBJECT, Scene, build_spec
+
+
+class Points:
+    """A fixed set of K points of the robot: body ids and offsets in the body frames (m)."""
+
+    def __init__(self, model: mujoco.MjModel, bodies: list[str], offsets: np.ndarray) -> None:
+        self.bodies = np.array([model.body(name).id for name in bodies])
+        self.offsets = np.asarray(offsets, float).reshape(-1, 3)
+
+
+def ancestor_mask(model: mujoco.MjModel) -> np.ndarray:
+    """(nbody, nv) float: 1 where a degree of freedom moves a body."""
+    mask = np.zeros((model.nbody, model.nv))
+    for body in range(1, model.nbody):
+        mask[body] = mask[model.body_parentid[body]]
+        start = model.body_dofadr[body]
+        mask[body, start : start + model.body_dofnum[body]] = 1.0
+    return mask
+
+
+class Kinematics(mink.Configuration):
+    """Robot and scene at one configuration, with what tasks and limits ask for.
+
+    ``update`` costs mj_kinematics and mj_comPos only; contacts are found when first asked for.
+
+    Args:
+        robot: The robot.
+        scene: Its surroundings; the object is a mocap body, placed by ``place_object``.
+        contact_distance: Contacts with the surroundings closer than this are found, m.
+        self_distance: Contacts between robot bodies closer than this are found, m; None finds none.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        scene: Scene,
+        contact_distance: float = 0.05,
+        self_distance: float | None = 0.02,
+    ) -> None:
+        self.robot = robot
+        super().__init__(_compile(robot, scene, contact_distance, self_distance))
+        model = self.model
+        self.ancestors = ancestor_mask(model)
+        points = [robot.keypoints[k] for k in KEYPOINTS]
+        self._keypoints = Points(model, [p.body for p in points], [p.offset for p in points])
+        feet = [robot.feet[side] for side in SIDES]
+        self._soles = Points(
+            model,
+            [foot.body for foot in feet for _ in foot.sole],
+            np.array([p for foot in feet for p in foot.sole]),
+        )
+        self.sole_count = len(feet[0].sole)
+        self._root = int(model.body(robot.root_body).id)
+        self.root_quaternion = slice(3, 7)
+
+    @cached_property
+    def metric(self) -> np.ndarray:
+        """(nv,) diagonal of S: ‖dq‖_S = ‖dqpos‖, since ‖δquaternion‖² = ¼‖ω‖²."""
+        metric = np.ones(self.model.nv)
+        metric[3:6] = 0.25
+        return metric
+
+    def place_object(self, pose: np.ndarray) -> None:
+        """Sets the (7,) object pose; takes effect at the next ``update``."""
+        self.data.mocap_pos[0], self.data.mocap_quat[0] = pose[:3], pose[3:]
+
+    def difference(self, q: np.ndarray) -> np.ndarray:
+        """(nv,) tangent q ⊖ this configuration."""
+        out = np.empty(self.model.nv)
+        mujoco.mj_differentiatePos(self.model, out, 1.0, self.data.qpos, q)
+        return out
+
+    def step(self, dq: np.ndarray) -> np.ndarray:
+        """(nq,) this configuration ⊕ dq."""
+        q = self.data.qpos.copy()
+        mujoco.mj_integratePos(self.model, q, dq, 1.0)
+        return q
+
+    def positions(self, points: Points) -> np.ndarray:
+        """(K, 3) world positions of points."""
+        rotation = self.data.xmat[points.bodies].reshape(-1, 3, 3)
+        return self.data.xpos[points.bodies] + (rotation @ points.offsets[:, :, None])[:, :, 0]
+
+    def jacobians(self, points: Points, positions: np.ndarray) -> np.ndarray:
+        """(3, K, nv) Jacobians of points at (K, 3) world positions.
+
+        J = mask ⊙ (linear + angular × (p - com)), from the spatial axes of all degrees of freedom.
+        """
+        cdof = self.data.cdof
+        arm = positions - self.data.subtree_com[self._root]
+        x, y, z = arm[:, 0:1], arm[:, 1:2], arm[:, 2:3]
+        wx, wy, wz = cdof[:, 0], cdof[:, 1], cdof[:, 2]
+        jacobian = np.empty((3, len(arm), len(cdof)))
+        np.subtract(wy * z, wz * y, out=jacobian[0])
+        np.subtract(wz * x, wx * z, out=jacobian[1])
+        np.subtract(wx * y, wy * x, out=jacobian[2])
+        jacobian += cdof[:, 3:].T[:, None, :]
+        jacobian *= self.ancestors[points.bodies]
+        return jacobian
+
+    def keypoints(self) -> np.ndarray:
+        """(15, 3) world keypoints."""
+        return self.positions(self._keypoints)
+
+    def keypoint_jacobians(self, positions: np.ndarray) -> np.ndarray:
+        """(3, 15, nv) Jacobians of the keypoints."""
+        return self.jacobians(self._keypoints, positions)
+
+    def soles(self) -> np.ndarray:
+        """(2, K, 3) world sole points, left foot first."""
+        return self.positions(self._soles).reshape(2, -1, 3)
+
+    def sole_jacobians(self, positions: np.ndarray) -> np.ndarray:
+        """(3, 2, K, nv) Jacobians of the sole points."""
+        jacobian = self.jacobians(self._soles, positions.reshape(-1, 3))
+        return jacobian.reshape(3, 2, -1, self.model.nv)
+
+    def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""
+        arm = points - self.data.subtree_com[self._root]
+        wrench = np.empty((len(arm), 6))
+        ax, ay, az = arm.T
+        nx, ny, nz = normals.T
+        wrench[:, 0] = ay * nz - az * ny
+        wrench[:, 1] = az * nx - ax * nz
+        wrench[:, 2] = ax * ny - ay * nx
+        wrench[:, 3:] = normals
+        return wrench @ self.data.cdof.T
+
+
+def _compile(
+    robot: Robot, scene: Scene, contact_distance: float, self_distance: float | None
+) -> mujoco.MjModel:
+    spec = build_spec(robot, scene, looks=False)
+    # MuJoCo adds the margins of a pair. Environment geoms carry what robot geoms do not.
+    robot_margin = 0.0 if self_distance is None else 0.5 * self_distance
+    for geom in spec.geoms:
+        surroundings = geom.parent.name in ("world", OBJECT)
+        geom.margin = contact_distance - robot_margin if surroundings else robot_margin
+        if self_distance is None and not surroundings:
+            geom.conaffinity = 0  # robot geoms no longer meet each other, the surroundings still do
+    for first, second in resting_pairs(robot):
+        spec.add_exclude(bodyname1=first, bodyname2=second)
+    return spec.compile()

@@ -1,0 +1,88 @@
+"""The quadratic program of one step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mink.tasks import BaseTask
+
+from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.limits import BoundLimit, RowLimit, Rows
+from omni_envs.retargeting.proximal_task import ProximalTask
+
+
+@dataclass(frozen=True, eq=False)
+class StepQP:
+    """minimise ½ dqᵀH dq + gᵀdq subject to lower ≤ dq ≤ upper, rows, and ‖dq‖_S ≤ radius.
+
+    Attributes:
+        H: (nv, nv).
+        g: (nv,).
+        lower: (nv,).
+        upper: (nv,).
+        rows: General rows.
+        metric: (nv,) diagonal of S.
+        radius: Trust region, infinite for none.
+    """
+
+    H: np.ndarray
+    g: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    rows: Rows
+    metric: np.ndarray
+    radius: float
+
+    def decrease(self, dq: np.ndarray) -> float:
+        """Change of the quadratic cost by a step."""
+        return float(dq @ (self.g + 0.5 * (self.H @ dq)))
+
+    def norm(self, dq: np.ndarray) -> float:
+        """‖dq‖_S."""
+        return float(np.sqrt(self.metric @ (dq * dq)))
+
+
+def step_rows(configuration: Kinematics, limits: Sequence[RowLimit]) -> Rows:
+    """All general rows at a configuration."""
+    parts = [rows for limit in limits if (rows := limit.rows(configuration)) is not None]
+    if not parts:
+        nv = configuration.model.nv
+        return Rows(np.zeros((0, nv)), np.zeros(0), np.zeros(0), np.zeros(0, int))
+    if len(parts) == 1:
+        return parts[0]
+    return Rows(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def step_bounds(
+    configuration: Kinematics, limits: Sequence[BoundLimit]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Intersection of all bounds; where rounding leaves it empty, its middle."""
+    lower = np.full(configuration.model.nv, -np.inf)
+    upper = np.full(configuration.model.nv, np.inf)
+    for limit in limits:
+        low, high = limit.bounds(configuration)
+        np.maximum(lower, low, out=lower)
+        np.minimum(upper, high, out=upper)
+    crossed = lower > upper
+    if crossed.any():
+        lower[crossed] = upper[crossed] = 0.5 * (lower[crossed] + upper[crossed])
+    return lower, upper
+
+
+def step_objective(
+    configuration: Kinematics, tasks: Sequence[BaseTask]
+) -> tuple[np.ndarray, np.ndarray]:
+    """H and g of all tasks, as ``mink.build_ik`` stacks them."""
+    nv = configuration.model.nv
+    H, g = np.zeros((nv, nv)), np.zeros(nv)
+    for task in tasks:
+        if isinstance(task, ProximalTask):  # diagonal: no dense matrix
+            H.flat[:: nv + 1] += task.hessian
+            g += task.gradient(configuration)
+            continue
+        objective = task.compute_qp_objective(configuration)
+        H += objective.H
+        g += objective.c
+    return H, g

@@ -1,0 +1,243 @@
+"""Retargeting: a human motion becomes a robot motion, frame by frame.
+
+On every frame t (OmniRetarget, arXiv 2509.26633, eq. 3-4):
+
+    minimise   w ‖L(p(q)) - δ_t‖²                 ``interaction_mesh``, ``interaction_mesh_task``
+               + ‖q ⊖ q_{t-1}‖²_Q  + posture      ``proximal_task``
+    subject to φ_j(q) ≥ 0                         ``contact_limit``: surroundings and self
+               q_min ≤ q ≤ q_max                  ``joint_limits``
+               |q - q_{t-1}| ≤ v_max Δt           ``joint_limits``
+               p_foot(q) = p_foot(stance start)   ``stance_limit``
+               ‖dq‖ ≤ ε on each step              ``solver``
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.errors import InvalidDataError
+from omni_envs.progress import ProgressCallback
+from omni_envs.retargeting.contact_limit import ContactLimit
+from omni_envs.retargeting.first_frame import aligned_poses
+from omni_envs.retargeting.frame_solver import FrameResult, FrameSolver
+from omni_envs.retargeting.interaction_mesh import InteractionMesh
+from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
+from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
+from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.options import RetargetOptions
+from omni_envs.retargeting.proximal_task import ProximalTask
+from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
+from omni_envs.retargeting.solver import solve_daqp
+from omni_envs.retargeting.stance_limit import ANCHORED, FREE, LOOSE, StanceLimit
+from omni_envs.robots import Robot
+
+# Stance windows are wider than what counts as relaxed by this much: numerical slack of the last step.
+_RELAXED = 2e-4
+
+
+def retarget(
+    source: SourceMotion,
+    robot: Robot,
+    options: RetargetOptions | None = None,
+    progress: ProgressCallback | None = None,
+) -> Retargeted:
+    """Retargets a source motion to a robot.
+
+    Never fails on a motion that contradicts the constraints: they give way in the order of
+    ``RELAXATIONS``, and ``Retargeted.frames`` says where and by how much.
+
+    Args:
+        source: Motion at the robot's scale.
+        robot: The robot.
+        options: Settings.
+        progress: Called with (frames done, frames in all).
+
+    Returns:
+        The robot motion at the source's fps.
+
+    Raises:
+        InvalidDataError: The source is not finite, or has no frames.
+    """
+    options = options or RetargetOptions()
+    _check(source)
+    mesh = InteractionMesh.of(source, options.surface_points)
+    return _Retargeter(source, robot, options, mesh).run(progress)
+
+
+def deformation_energy(
+    source: SourceMotion,
+    robot: Robot,
+    qpos: np.ndarray,
+    options: RetargetOptions | None = None,
+) -> np.ndarray:
+    """Deformation energy of a robot motion against a source, in the object's frame.
+
+    Args:
+        source: The motion it follows, with its object poses.
+        robot: The robot.
+        qpos: (T, 7 + n) configurations, one per frame of the source.
+        options: Settings of the mesh.
+
+    Returns:
+        (T,) energy, weight 1, m².
+
+    Raises:
+        InvalidDataError: qpos does not have a row per frame of the source.
+    """
+    expected = (source.num_frames, robot.nq)
+    if np.shape(qpos) != expected:
+        raise InvalidDataError(
+            f"Motion of {robot.name!r}", "qpos", f"of shape {expected}", str(np.shape(qpos))
+        )
+    options = options or RetargetOptions()
+    mesh = InteractionMesh.of(source, options.surface_points)
+    return mesh.energy(keypoint_positions(robot, source, qpos))
+
+
+def keypoint_positions(robot: Robot, source: SourceMotion, qpos: np.ndarray) -> np.ndarray:
+    """(T, 15, 3) world keypoints of (T, 7 + n) configurations."""
+    configuration = Kinematics(robot, source.scene)
+    keypoints = np.empty((len(qpos), source.keypoints.shape[1], 3))
+    for t, q in enumerate(qpos):
+        configuration.update(q)
+        keypoints[t] = configuration.keypoints()
+    return keypoints
+
+
+def stance_tiers(source: SourceMotion, options: RetargetOptions) -> np.ndarray:
+    """(T, 2) tier of each foot on each frame: ``FREE``, ``LOOSE`` or ``ANCHORED``.
+
+    A foot is held from the second frame of a stance interval on; the first fixes where.
+    """
+    tiers = np.full((source.num_frames, 2), FREE)
+    for tier, mode in ((LOOSE, options.stance.loose), (ANCHORED, options.stance.anchored)):
+        if mode is not None:
+            flags = source.stance[mode]
+            tiers[1:][flags[1:] & flags[:-1]] = tier
+    return tiers
+
+
+def _check(source: SourceMotion) -> None:
+    owner = f"SourceMotion {source.name!r}"
+    if source.num_frames < 1:
+        raise InvalidDataError(owner, "keypoints", "at least one frame", "0 frames")
+    for name in ("keypoints", "object_poses", "source_object_poses"):
+        array = getattr(source, name)
+        if array is not None and not np.isfinite(array).all():
+            first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+            raise InvalidDataError(owner, name, "finite", f"NaN or infinity first at {first}")
+
+
+class _Retargeter:
+    """The tasks and limits of one clip, and the loop over its frames."""
+
+    def __init__(
+        self, source: SourceMotion, robot: Robot, options: RetargetOptions, mesh: InteractionMesh
+    ) -> None:
+        self.source, self.robot, self.options = source, robot, options
+        self.configuration = Kinematics(
+            robot,
+            source.scene,
+            options.contact_distance,
+            options.self_distance if options.self_collision else None,
+        )
+        metric = self.configuration.metric
+        self.mesh = InteractionMeshTask(mesh, options.laplacian_weight)
+        self.smoothness = ProximalTask(options.smoothness_weight * metric)
+        posture = np.zeros(robot.nv)
+        for joint, weight in robot.posture_weights.items():
+            posture[6 + robot.joint_names.index(joint)] = weight
+        self.posture = ProximalTask(posture)
+        self.posture.set_target(np.concatenate([[0, 0, 0, 1, 0, 0, 0], np.zeros(robot.num_joints)]))
+        bounds = [JointLimit(robot)]
+        self.velocity = None
+        if options.velocity_limits is not None:
+            self.velocity = StepVelocityLimit(robot, source.fps, options.velocity_limits)
+            bounds.append(self.velocity)
+        self.contact = ContactLimit(options.penetration_tolerance)
+        self.stance = StanceLimit(options.stance.tolerance, options.stance.loose_speed / source.fps)
+        self.solver = FrameSolver(
+            self.configuration,
+            self.mesh,
+            [self.smoothness, self.posture],
+            bounds,
+            [self.contact, self.stance],
+            solve_daqp,
+            options,
+        )
+        self.tiers = stance_tiers(source, options)
+        self.anchors = np.zeros((2, self.configuration.sole_count, 3))
+
+    def run(self, progress: ProgressCallback | None) -> Retargeted:
+        frames = self.source.num_frames
+        qpos = np.empty((frames, self.robot.nq))
+        energy, seconds = np.empty(frames), np.empty(frames)
+        iterations = np.empty(frames, int)
+        violations = np.empty((frames, len(RELAXATIONS)))
+        for t in range(frames):
+            start = perf_counter()
+            self._place(t)
+            if t == 0:
+                result = self._first()
+            else:
+                result = self._next(t, qpos[t - 1])
+            qpos[t], iterations[t], violations[t] = result.q, result.iterations, result.violations
+            energy[t] = self.mesh.energy(self.configuration)
+            self._plant(t)
+            seconds[t] = perf_counter() - start
+            if progress is not None:
+                progress(t + 1, frames)
+        tolerance = max(_RELAXED, self.options.restoration_tolerance)
+        record = SolveRecord(
+            energy=energy,
+            iterations=iterations,
+            relaxed=(violations > tolerance).any(axis=1),
+            violations={name: violations[:, i] for i, name in enumerate(RELAXATIONS)},
+            seconds=seconds,
+        )
+        return Retargeted(
+            self.robot.name,
+            self.source.fps,
+            qpos,
+            self.source.object_poses,
+            self.source,
+            self.options,
+            record,
+        )
+
+    def _place(self, t: int) -> None:
+        """Sets the scene and the mesh to frame t."""
+        self.mesh.set_frame(t)
+        if self.source.object_poses is not None:
+            self.configuration.place_object(self.source.object_poses[t])
+
+    def _first(self) -> FrameResult:
+        """The best of several starts: no previous frame, no speed limit, no stance, no trust region."""
+        self.smoothness.set_target(None)
+        self.stance.release()
+        best: FrameResult | None = None
+        lowest = np.inf
+        for pose in aligned_poses(self.configuration, self.source.keypoints[0]):
+            result = self.solver.solve(pose, self.options.first_iterations, np.inf)
+            energy = self.mesh.energy(self.configuration) + 1e3 * max(result.violations)
+            if energy < lowest:
+                best, lowest = result, energy
+        assert best is not None
+        self.configuration.update(best.q)
+        return best
+
+    def _next(self, t: int, previous: np.ndarray) -> FrameResult:
+        """Frame t from the previous one."""
+        self.smoothness.set_target(previous)
+        if self.velocity is not None:
+            self.velocity.set_previous(previous)
+        self.stance.hold(self.anchors, self.tiers[t])
+        return self.solver.solve(previous, self.options.iterations, self.options.trust_region)
+
+    def _plant(self, t: int) -> None:
+        """Moves the anchor of every foot that frame t did not hold at it."""
+        moved = self.tiers[t] != ANCHORED
+        self.anchors[moved] = self.configuration.soles()[moved]

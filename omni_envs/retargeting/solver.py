@@ -1,0 +1,101 @@
+"""Solving the step: DAQP, an exact trust region, and graded softness where constraints contradict."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import daqp
+import numpy as np
+
+from omni_envs.retargeting.limits import CONTACT, SELF, STANCE
+from omni_envs.retargeting.qp import StepQP
+
+_SOFT = 8
+# Weights of soft rows, (quadratic, linear), by kind: each kind outweighs those that give way before it, and
+# the cost. The linear part makes the violation zero wherever zero is possible.
+_SOFTNESS = {STANCE: (1e4, 1e1), SELF: (1e6, 1e3), CONTACT: (1e8, 1e5)}
+_RADIUS_TOLERANCE = 1e-3
+
+
+class StepSolver(Protocol):
+    """Solves a step."""
+
+    def __call__(self, qp: StepQP) -> tuple[np.ndarray, bool]:
+        """Returns the step (nv,) and whether general rows had to give way."""
+
+
+def solve_daqp(qp: StepQP) -> tuple[np.ndarray, bool]:
+    """Solves a step with DAQP. Never fails: bounds hold, contradicting rows give way in order.
+
+    The second-order cone ‖dq‖_S ≤ ε is active exactly when the program with H + λS has its solution on the
+    cone, so λ is searched only when the free step is too long.
+    """
+    soft = False
+    dq = _solve(qp, 0.0)
+    if dq is None:
+        soft = True
+        dq = _solve_soft(qp, 0.0)
+    if qp.norm(dq) <= qp.radius * (1 + _RADIUS_TOLERANCE):
+        return dq, soft
+
+    # ‖dq(λ)‖ falls with λ, and 1/‖dq(λ)‖ is nearly linear: a bracketed secant takes few steps.
+    low, high = 0.0, np.inf
+    inverse = 1.0 / qp.norm(dq)
+    damping = float(np.trace(qp.H) / qp.metric.sum()) * (qp.norm(dq) / qp.radius - 1.0) * 0.1
+    previous = (0.0, inverse)
+    for _ in range(30):
+        trial = None if soft else _solve(qp, damping)
+        if trial is None:
+            # The cone and the rows contradict each other.
+            soft = True
+            trial = _solve_soft(qp, damping)
+        dq, norm = trial, qp.norm(trial)
+        if abs(norm / qp.radius - 1.0) <= _RADIUS_TOLERANCE or high - low < 1e-9 * (1 + low):
+            break
+        if norm > qp.radius:
+            low = damping
+        else:
+            high = damping
+        slope = (1.0 / norm - previous[1]) / (damping - previous[0] or np.inf)
+        previous = (damping, 1.0 / norm)
+        guess = damping + (1.0 / qp.radius - 1.0 / norm) / slope if slope > 0 else np.nan
+        if not low < guess < high:
+            guess = 0.5 * (low + high) if np.isfinite(high) else 10.0 * damping
+        damping = guess
+    return dq, soft
+
+
+def _program(qp: StepQP, damping: float) -> tuple[np.ndarray, ...]:
+    H = qp.H
+    if damping:
+        H = H.copy()
+        H.flat[:: len(H) + 1] += damping * qp.metric
+    upper = np.concatenate([qp.upper, qp.rows.upper])
+    lower = np.concatenate([qp.lower, qp.rows.lower])
+    np.clip(upper, -1e30, 1e30, out=upper)
+    np.clip(lower, -1e30, 1e30, out=lower)
+    return H, qp.g, np.ascontiguousarray(qp.rows.A), upper, lower
+
+
+def _solve(qp: StepQP, damping: float) -> np.ndarray | None:
+    program = _program(qp, damping)
+    dq, _, flag, _ = daqp.solve(*program, np.zeros(len(program[3]), np.intc), eps_prox=0.0)
+    return dq if flag > 0 else None
+
+
+def _solve_soft(qp: StepQP, damping: float) -> np.ndarray:
+    """Solves with soft rows; bounds stay hard and always leave a step."""
+    H, g, A, upper, lower = _program(qp, damping)
+    sense = np.zeros(len(upper), np.intc)
+    sense[len(g) :] = _SOFT
+    quadratic, linear = np.full(len(upper), 1.0), np.zeros(len(upper))
+    kind = qp.rows.kind
+    for k, (rho, weight) in _SOFTNESS.items():
+        quadratic[len(g) :][kind == k], linear[len(g) :][kind == k] = 1.0 / rho, weight
+    model = daqp.Model()
+    model.setup(H, g, A, upper, lower, sense)
+    model.soft_weights(quadratic, quadratic, linear, linear)
+    dq, _, flag, _ = model.solve()
+    if flag <= 0:
+        raise AssertionError(f"DAQP failed on an elastic program: exit flag {flag}")
+    return dq

@@ -1,0 +1,82 @@
+"""Points on object, terrain and ground that the interaction mesh connects with the body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from omni_envs.demonstrations.source_motion import SourceMotion
+
+# Upward faces carry feet, hands and knees: they get this many times the points per area of others.
+_TOP_WEIGHT = 4.0
+# Without object and terrain: 9 × 9 jittered ground points, 0.28 m apart at human scale, around the body.
+_GROUND_CELLS, _GROUND_SPACING = 9, 0.28
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """Corresponding points of source and target surroundings.
+
+    Attributes:
+        source: (N, 3) or (T, N, 3) points in the frame of the source object, or the world without one.
+        target: The same for the target object.
+    """
+
+    source: np.ndarray
+    target: np.ndarray
+
+
+def surface_points(source: SourceMotion, count: int) -> SurfacePoints:
+    """Chooses the surface points of a source: on the object, else on the terrain, else on the ground.
+
+    Deterministic. Object points keep their place when the object shrinks by the source's scale.
+
+    Args:
+        source: The motion.
+        count: Number of points on object or terrain.
+    """
+    scene = source.scene
+    if scene.object is not None:
+        points = _spread(scene.object.surface(), count, top_weight=1.0)
+        return SurfacePoints(points * source.scale, points)
+    if scene.terrain is not None:
+        points = _spread(scene.terrain.surface(), count, top_weight=_TOP_WEIGHT)
+        return SurfacePoints(points, points)
+    points = _ground(source.keypoints[:, 0, :2], _GROUND_SPACING * source.scale)
+    return SurfacePoints(points, points)
+
+
+def _spread(surface: trimesh.Trimesh, count: int, top_weight: float) -> np.ndarray:
+    """(count, 3) evenly spread points: farthest-point choice among random ones."""
+    rng = np.random.default_rng(0)
+    normals, areas = surface.face_normals, surface.area_faces
+    face = rng.choice(len(areas), size=30 * count, p=areas / areas.sum())
+    u, v = np.sqrt(rng.random(face.size)), rng.random(face.size)
+    corners = surface.triangles[face]
+    weights = np.stack([1 - u, u * (1 - v), u * v], axis=1)
+    candidates = np.einsum("nk,nkd->nd", weights, corners)
+    # Density goes with the inverse square of the spacing.
+    stretch = np.where(normals[face, 2] > 0.7, np.sqrt(top_weight), 1.0)
+    chosen = np.empty(count, int)
+    chosen[0] = 0
+    distance = np.full(face.size, np.inf)
+    for i in range(1, count):
+        step = np.linalg.norm(candidates - candidates[chosen[i - 1]], axis=1) * stretch
+        np.minimum(distance, step, out=distance)
+        chosen[i] = int(np.argmax(distance))
+    return candidates[chosen]
+
+
+def _ground(centres: np.ndarray, spacing: float) -> np.ndarray:
+    """(T, N, 3) points of one fixed jittered grid, those near each (T, 2) centre."""
+    offsets = np.arange(_GROUND_CELLS) - _GROUND_CELLS // 2
+    grid = np.stack(np.meshgrid(offsets, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells = np.floor(centres / spacing).astype(np.int64)[:, None] + grid
+    # A hash of the cell, not a random stream: a cell keeps its point when the body comes back to it. The
+    # jitter avoids cospherical points, for which the Delaunay mesh is arbitrary.
+    seed = cells[..., 0] * 73856093 ^ cells[..., 1] * 19349663
+    jitter = np.stack([(seed * k % 10007) / 10007.0 for k in (7919, 104729)], axis=-1)
+    xy = (cells + 0.2 + 0.6 * jitter) * spacing
+    return np.concatenate([xy, np.zeros((*xy.shape[:2], 1))], axis=-1)
