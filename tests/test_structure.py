@@ -12,6 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "omni_envs"
 # Every room may import from the rooms before it, never from those after it.
 ORDER = (
     "errors",
+    "rotations",
     "progress",
     "robots",
     "scenes",
