@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import trimesh
 
 from omni_envs.errors import FileFormatError, InvalidDataError
 from omni_envs.scenes import Box, ConvexMesh, Part, load_convex_parts
@@ -34,8 +35,6 @@ def write(path, mesh):
 
 
 def test_two_pieces_are_two_parts(tmp_path):
-    import trimesh
-
     a, b = Box((0.1, 0.1, 0.1)).mesh(), Box((0.2, 0.1, 0.1)).mesh().apply_translation([1, 0, 0])
     parts = load_convex_parts(write(tmp_path / "two.obj", trimesh.util.concatenate([a, b])))
     volumes = sorted(p.mesh().volume for p in parts)
@@ -55,8 +54,6 @@ def test_open_surface_is_refused(tmp_path):
 
 
 def test_concave_piece_is_refused(tmp_path):
-    import trimesh
-
     ring = trimesh.creation.torus(0.5, 0.1)
     with pytest.raises(FileFormatError, match="convex"):
         load_convex_parts(write(tmp_path / "ring.obj", ring))
@@ -68,3 +65,24 @@ def test_files_without_a_solid_are_refused(tmp_path, text):
     path.write_text(text)
     with pytest.raises(FileFormatError, match=r"bad\.obj"):
         load_convex_parts(path)
+
+
+def test_box_mesh_is_recognised_as_a_box_turned_as_little_as_possible(tmp_path):
+    turn = trimesh.transformations.rotation_matrix(0.3, [0, 0, 1], [0.1, 0.2, 0.3])
+    box = Box((0.1, 0.2, 0.3)).mesh().apply_transform(turn)
+    (part,) = load_convex_parts(write(tmp_path / "turned.obj", box))
+    np.testing.assert_allclose(part.shape.half_extents, (0.1, 0.2, 0.3), atol=1e-6)
+    np.testing.assert_allclose(part.quaternion, [np.cos(0.15), 0, 0, np.sin(0.15)], atol=1e-6)
+    np.testing.assert_allclose(part.mesh().centroid, box.centroid, atol=1e-6)
+
+
+def test_scan_is_thinned_to_its_hull_and_keeps_its_debris(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.2)
+    crumb = trimesh.creation.box(extents=[0.004] * 3).apply_translation([0.2, 0, 0])
+    path = write(tmp_path / "scan.obj", trimesh.util.concatenate([ball, crumb]))
+    (part,) = load_convex_parts(path)
+    assert isinstance(part.shape, ConvexMesh)
+    assert len(part.shape.vertices) <= 256
+    assert part.shape.vertices[:, 0].max() == pytest.approx(0.202, abs=2e-4)
+    assert part.mesh().volume == pytest.approx(ball.volume, rel=0.05)
+    assert part.mesh().is_watertight
