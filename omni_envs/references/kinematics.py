@@ -39,7 +39,7 @@ def reference_from_qpos(
         object_poses: (T, 7) object poses where the scene has an object.
         scene: Surroundings, flat ground by default.
         contacts: Link to (T,) bool.
-        stance: (T, 2) bool.
+        stance: (T, 2) bool, none planted by default.
         report: Metrics of the motion.
         source: The demonstration that the motion follows, at the same frames.
         provenance: JSON-compatible facts about the origin.
@@ -74,11 +74,11 @@ def reference_from_qpos(
         body_quaternions=quaternions,
         body_linear_velocities=linear,
         body_angular_velocities=angular,
+        stance=np.zeros((len(qpos), 2), bool) if stance is None else np.asarray(stance),
         scene=scene or Scene(),
         object_poses=poses,
         object_velocities=None if poses is None else pose_velocities(poses, fps),
         contacts=dict(contacts or {}),
-        stance=stance,
         report=report,
         source=source,
         provenance=dict(provenance or {}),

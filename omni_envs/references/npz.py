@@ -51,7 +51,7 @@ def write_npz(path: str | Path, arrays: Mapping[str, np.ndarray]) -> Path:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.{uuid.uuid4().hex}.tmp")
     try:
         with open(temporary, "xb") as file:
-            np.savez_compressed(file, allow_pickle=False, **plain)  # type: ignore[arg-type]
+            np.savez_compressed(file, allow_pickle=False, **plain)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)
@@ -77,12 +77,11 @@ def read_npz(path: str | Path, *, checked: bool = True) -> dict[str, np.ndarray]
     if not path.is_file():
         raise FileFormatError(path, "file", "an existing .npz file", "nothing")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise FileFormatError(path, "file", "an .npz archive", "a single array")
+        file = np.load(path, allow_pickle=False)
+        if isinstance(file, np.ndarray):
+            raise ValueError("a single array")
+        with file:
             arrays = {name: file[name] for name in file.files}
-    except FileFormatError:
-        raise
     except (OSError, ValueError, EOFError, KeyError, NotImplementedError) as error:
         raise FileFormatError(path, "file", "a complete .npz archive", _short(error)) from error
     except (zipfile.BadZipFile, zlib.error, SyntaxError, MemoryError) as error:

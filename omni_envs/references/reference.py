@@ -33,11 +33,11 @@ class Reference:
         body_quaternions: (T, B, 4) wxyz.
         body_linear_velocities: (T, B, 3) of the body **origins** in the world, m/s.
         body_angular_velocities: (T, B, 3) in the world, rad/s.
+        stance: (T, 2) bool, left and right foot planted.
         scene: Ground, object, terrain.
         object_poses: (T, 7) position and quaternion wxyz, or None without object.
         object_velocities: (T, 6) linear and angular velocity in the world, or None without object.
         contacts: Link of ``CONTACT_LINKS`` to (T,) bool: touches object or terrain.
-        stance: (T, 2) bool, left and right foot planted.
         report: Metrics of every frame, or None where not evaluated.
         source: The demonstration at robot scale and at the same frames, or None for foreign
             motions.
@@ -53,18 +53,16 @@ class Reference:
     body_quaternions: np.ndarray
     body_linear_velocities: np.ndarray
     body_angular_velocities: np.ndarray
+    stance: np.ndarray
     scene: Scene = field(default_factory=Scene)
     object_poses: np.ndarray | None = None
     object_velocities: np.ndarray | None = None
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
-    stance: np.ndarray | None = None
     report: ReferenceReport | None = None
     source: SourceMotion | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.stance is None:
-            object.__setattr__(self, "stance", np.zeros((len(self.qpos), 2), bool))
         object.__setattr__(self, "body_names", tuple(self.body_names))
         _validate(self)
 
@@ -135,6 +133,10 @@ def _validate(r: Reference) -> None:
     shape = np.shape(r.qpos)
     check(len(shape) == 2 and shape[1] >= 7, "qpos", "(T, 7 + hinges)", shape)
     check(shape[0] >= 1, "qpos", "at least 1 frame", "0 frames")
+    if r.robot in robot_names():
+        robot = get_robot(r.robot)
+        check(shape[1] == robot.nq, "qpos", f"(T, {robot.nq}) for {robot.title}", shape)
+        check(r.body_names == robot.body_names, "body_names", "those of the robot", r.body_names)
     frames, bodies = shape[0], len(r.body_names)
     check(
         (r.object_poses is None) == (r.scene.object is None),
@@ -191,10 +193,6 @@ def _validate(r: Reference) -> None:
         if part is not None:
             check(part.num_frames == frames, name, f"of {frames} frames", part.num_frames)
             check(np.isclose(part.fps, r.fps), name, f"at {r.fps} fps", part.fps)
-    if r.robot in robot_names():
-        robot = get_robot(r.robot)
-        check(shape[1] == robot.nq, "qpos", f"(T, {robot.nq}) for {robot.title}", shape)
-        check(r.body_names == robot.body_names, "body_names", "those of the robot", r.body_names)
 
 
 def _first(mask: np.ndarray) -> tuple[int, ...]:
