@@ -1,0 +1,1 @@
+"""Training: adapters to the trainers, the recipe, evaluation."""

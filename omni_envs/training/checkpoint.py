@@ -1,0 +1,89 @@
+"""Checkpoints of a training run: everything needed to go on after a kill, without pickles."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from omni_envs.errors import FileFormatError
+
+FOLDER = "checkpoints"
+_NAME = re.compile(r"step_(\d+)\.pt")
+_FORMAT = 1
+
+
+@dataclass
+class Checkpoint:
+    """State of a training run between two updates.
+
+    Attributes:
+        steps: Control steps trained for.
+        seconds: Training time so far, resumed runs together.
+        updates: Updates of the network.
+        learning_rate: Learning rate of the next update.
+        policy: Weights and observation statistics.
+        optimizer: State of the optimiser.
+        rng: State of torch's random generator.
+        history: One row of figures per update.
+    """
+
+    steps: int
+    seconds: float
+    updates: int
+    learning_rate: float
+    policy: dict[str, Tensor]
+    optimizer: dict[str, Any]
+    rng: Tensor
+    history: list[dict[str, float]] = field(default_factory=list)
+
+    def save(self, run: Path) -> Path:
+        """Writes the checkpoint into a run directory; it is there whole or not at all."""
+        path = run / FOLDER / f"step_{self.steps:012d}.pt"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_suffix(f".{os.getpid()}.partial")
+        with partial.open("wb") as file:
+            torch.save({"format": _FORMAT, **vars(self)}, file)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+        return path
+
+    @classmethod
+    def load(cls, path: Path) -> Checkpoint:
+        """Reads a checkpoint.
+
+        Raises:
+            FileFormatError: It is missing, damaged or of another version.
+        """
+        if not path.is_file():
+            raise FileFormatError(path, "file", "a checkpoint", "nothing")
+        try:
+            data = torch.load(path, weights_only=True)
+        except (RuntimeError, OSError, EOFError, pickle.UnpicklingError, ValueError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise FileFormatError(path, "content", "a whole checkpoint", reason) from error
+        if not isinstance(data, dict) or data.pop("format", None) != _FORMAT:
+            raise FileFormatError(path, "format", f"version {_FORMAT}", "another one")
+        try:
+            return cls(**data)
+        except TypeError as error:
+            raise FileFormatError(path, "fields", "those of a checkpoint", str(error)) from error
+
+
+def checkpoints(run: Path) -> list[Path]:
+    """Returns the checkpoints of a run directory, oldest first; unfinished files do not count."""
+    found = [p for p in (run / FOLDER).glob("step_*.pt") if _NAME.fullmatch(p.name)]
+    return sorted(found, key=lambda p: int(_NAME.fullmatch(p.name)[1]))  # type: ignore[index]
+
+
+def keep_newest(run: Path, count: int) -> None:
+    """Deletes all checkpoints but the first (the untrained policy) and the newest ``count``."""
+    for path in checkpoints(run)[1:-count]:
+        path.unlink()

@@ -1,0 +1,158 @@
+"""What a training run is: one frozen description that is saved beside its results."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Literal
+
+from omni_envs.errors import FileFormatError, InvalidOptionError
+
+CONFIG_FILE = "config.json"
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """Hyper-parameters of PPO; the defaults are BeyondMimic's (rsl_rl).
+
+    Attributes:
+        rollout_steps: Control steps per environment between two updates.
+        epochs: Passes over a rollout.
+        minibatches: Gradient steps per pass.
+        learning_rate: Initial learning rate of Adam.
+        desired_kl: The learning rate is divided by 1.5 where an update moves the policy by more
+            than twice this KL divergence, multiplied where by less than half; 0 keeps it constant.
+        gamma: Discount per control step.
+        gae_lambda: λ of generalised advantage estimation.
+        clip: Clipping range of the probability ratio.
+        value_clip: Clipping range of the value, in units of return; 0 does not clip.
+        value_weight: Weight of the value loss.
+        entropy_weight: Weight of the entropy bonus.
+        max_grad_norm: Largest norm of the gradient.
+        hidden: Widths of the hidden layers, of actor and critic alike.
+        initial_std: Standard deviation of the exploration noise at the start, in units of action.
+    """
+
+    rollout_steps: int = 24
+    epochs: int = 5
+    minibatches: int = 4
+    learning_rate: float = 1e-3
+    desired_kl: float = 0.01
+    gamma: float = 0.99
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    value_clip: float = 0.2
+    value_weight: float = 1.0
+    entropy_weight: float = 0.005
+    max_grad_norm: float = 1.0
+    hidden: tuple[int, ...] = (512, 256, 128)
+    initial_std: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("rollout_steps", "epochs", "minibatches", "learning_rate", "initial_std"):
+            _positive("PPOConfig", name, getattr(self, name))
+        if not self.hidden or any(width < 1 for width in self.hidden):
+            raise InvalidOptionError(f"PPOConfig: hidden must be widths ≥ 1; got {self.hidden}.")
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """A training run.
+
+    Attributes:
+        env: Environment id.
+        out: Run directory; everything the run makes lies in it.
+        steps: Control steps to train for, all environments together.
+        trainer: Library that trains.
+        num_envs: Simulations.
+        num_threads: Physics threads; 0 takes every core.
+        seed: Seed of the network, the exploration and the environment.
+        env_options: Options of the environment, as ``gymnasium.make`` takes them; what trains
+            faster (``{"action": {"mode": "residual"}}``) or helps the critic is set here.
+        time_limit: Seconds after which training ends before ``steps`` are reached; 0 = no limit.
+        checkpoint_every: Updates between two checkpoints.
+        evaluation_episodes: Episodes of the evaluation.
+        ppo: Hyper-parameters.
+    """
+
+    env: str
+    out: Path
+    steps: int
+    trainer: Literal["sb3"] = "sb3"
+    num_envs: int = 256
+    num_threads: int = 0
+    seed: int = 0
+    env_options: Mapping[str, Any] = field(default_factory=dict)
+    time_limit: float = 0.0
+    checkpoint_every: int = 50
+    evaluation_episodes: int = 100
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "num_envs", "checkpoint_every", "evaluation_episodes"):
+            _positive("TrainConfig", name, getattr(self, name))
+        if self.trainer != "sb3":
+            raise InvalidOptionError(f"TrainConfig: trainer must be 'sb3'; got {self.trainer!r}.")
+        object.__setattr__(self, "out", Path(self.out))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns JSON-compatible data; ``from_dict`` is its inverse."""
+        data = asdict(self)
+        data["out"] = str(self.out)
+        data["env_options"] = json.loads(json.dumps(dict(self.env_options)))
+        data["ppo"]["hidden"] = list(self.ppo.hidden)
+        return data
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> TrainConfig:
+        """Rebuilds a configuration from ``to_dict``.
+
+        Raises:
+            InvalidOptionError: A field is unknown, missing or not allowed.
+        """
+        _known("TrainConfig", data, cls)
+        ppo = dict(data.get("ppo", {}))
+        _known("TrainConfig.ppo", ppo, PPOConfig)
+        if "hidden" in ppo:
+            ppo["hidden"] = tuple(ppo["hidden"])
+        try:
+            return cls(**{**data, "ppo": PPOConfig(**ppo)})
+        except TypeError as error:
+            raise InvalidOptionError(f"TrainConfig: {error}.") from error
+
+    def save(self) -> Path:
+        """Writes ``config.json`` into the run directory."""
+        path = self.out / CONFIG_FILE
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(self.to_dict(), indent=2) + "\n")
+        return path
+
+    @classmethod
+    def load(cls, run: str | Path) -> TrainConfig:
+        """Reads the configuration of a run directory, which may have been moved.
+
+        Raises:
+            FileFormatError: There is none, or it is damaged.
+        """
+        path = Path(run) / CONFIG_FILE
+        if not path.is_file():
+            raise FileFormatError(path, "file", "the configuration of a training run", "nothing")
+        try:
+            data = json.loads(path.read_text())
+            return cls.from_dict({**data, "out": Path(run)})
+        except (ValueError, TypeError) as error:
+            raise FileFormatError(path, "content", "a TrainConfig as JSON", str(error)) from error
+
+
+def _positive(owner: str, name: str, value: float) -> None:
+    if not value > 0:
+        raise InvalidOptionError(f"{owner}: {name} must be positive; got {value}.")
+
+
+def _known(owner: str, data: Mapping[str, Any], cls: type) -> None:
+    valid = {f.name for f in fields(cls)}
+    unknown = sorted(set(data) - valid)
+    if unknown:
+        raise InvalidOptionError(f"{owner}: unknown {unknown}. Valid: {', '.join(sorted(valid))}.")

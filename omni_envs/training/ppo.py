@@ -1,0 +1,241 @@
+"""PPO as rsl_rl writes it, inside Stable-Baselines3: adaptive learning rate and clipped values.
+
+SB3 collects, bootstraps truncated episodes and computes advantages; the update is here, readable
+in one piece. Differences from SB3's own: the learning rate follows the KL divergence of the whole
+Gaussian, advantages are normalised per rollout instead of per mini-batch, the value loss is the
+larger of the clipped and the plain one, and observation normalisers are fed after the update, so
+that a rollout and its update see the same network.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecEnv
+from torch import Tensor, nn
+
+from omni_envs.errors import OmniEnvsError
+from omni_envs.training.config import PPOConfig
+from omni_envs.training.policy import TrackingPolicy
+
+MIN_LEARNING_RATE, MAX_LEARNING_RATE = 1e-5, 1e-2
+
+
+@dataclass
+class Rollout:
+    """A rollout as flat tensors: B = rollout steps × environments samples.
+
+    Attributes:
+        observations: (B, ·), or one such tensor for actor and one for critic.
+        actions: (B, n) as sampled, before clipping to the action space.
+        log_probability: (B,) of the actions when they were taken.
+        values: (B,) predicted when the actions were taken.
+        returns: (B,) λ-returns.
+        advantages: (B,) normalised to mean 0 and deviation 1 over the rollout.
+        mean: (B, n) of the policy that acted; filled in at the update.
+        std: (B, n) of the policy that acted; filled in at the update.
+    """
+
+    observations: Tensor | dict[str, Tensor]
+    actions: Tensor
+    log_probability: Tensor
+    values: Tensor
+    returns: Tensor
+    advantages: Tensor
+    mean: Tensor | None = None
+    std: Tensor | None = None
+
+    def minibatches(self, count: int) -> Iterator[Rollout]:
+        """Yields ``count`` random parts, every sample in exactly one."""
+        for index in torch.randperm(len(self.actions)).tensor_split(count):
+            yield Rollout(**{name: _take(value, index) for name, value in vars(self).items()})
+
+
+class TrackingPPO(PPO):
+    """SB3's PPO with the update of rsl_rl.
+
+    Args:
+        env: SB3 vector environment.
+        config: Hyper-parameters.
+        seed: Seed of network, exploration and environment.
+        tensorboard_log: Folder of the TensorBoard log, None = no log.
+    """
+
+    policy: TrackingPolicy
+
+    def __init__(
+        self,
+        env: VecEnv,
+        config: PPOConfig | None = None,
+        seed: int | None = None,
+        tensorboard_log: str | None = None,
+    ) -> None:
+        config = config or PPOConfig()
+        self.config = config
+        super().__init__(
+            TrackingPolicy,
+            env,
+            learning_rate=config.learning_rate,
+            n_steps=config.rollout_steps,
+            batch_size=max(2, config.rollout_steps * env.num_envs // config.minibatches),
+            n_epochs=config.epochs,
+            gamma=config.gamma,
+            gae_lambda=config.gae_lambda,
+            clip_range=config.clip,
+            clip_range_vf=config.value_clip or None,
+            ent_coef=config.entropy_weight,
+            vf_coef=config.value_weight,
+            max_grad_norm=config.max_grad_norm,
+            policy_kwargs={
+                "hidden": config.hidden,
+                "initial_std": config.initial_std,
+                "optimizer_kwargs": {"fused": True},
+            },
+            tensorboard_log=tensorboard_log,
+            seed=seed,
+            device="cpu",
+            stats_window_size=max(100, env.num_envs),
+        )
+        self.current_learning_rate = config.learning_rate
+
+    def collect_rollouts(self, *args: Any, **kwargs: Any) -> bool:
+        """Collects a rollout with one thread for the network: the cores belong to the physics."""
+        with _threads(1):
+            return super().collect_rollouts(*args, **kwargs)
+
+    def train(self) -> None:
+        """Updates the network from the rollout that was just collected.
+
+        The very first rollout only feeds the normalisers.
+
+        Raises:
+            OmniEnvsError: The loss is not finite any more.
+        """
+        rollout = self._rollout()
+        network = self.policy.mlp_extractor
+        if int(network.actor_normalizer.count) > 0:
+            self._update(rollout)
+        network.update_normalizers(rollout.observations)
+
+    def _rollout(self) -> Rollout:
+        buffer = self.rollout_buffer
+
+        def flat(array: Any) -> Tensor:
+            return torch.from_numpy(array).flatten(0, 1)
+
+        seen = buffer.observations
+        advantages = flat(buffer.advantages)
+        return Rollout(
+            {k: flat(v) for k, v in seen.items()} if isinstance(seen, dict) else flat(seen),
+            flat(buffer.actions),
+            flat(buffer.log_probs),
+            flat(buffer.values),
+            flat(buffer.returns),
+            (advantages - advantages.mean()) / (advantages.std() + 1e-8),
+        )
+
+    def _update(self, rollout: Rollout) -> None:
+        config, policy = self.config, self.policy
+        policy.set_training_mode(True)
+        with torch.no_grad():
+            before = policy.get_distribution(rollout.observations).distribution
+            rollout.mean, rollout.std = before.mean, before.stddev
+        totals: Counter[str] = Counter()
+        # Actor and critic share no weights: each learns in its own thread, so that two cores are
+        # busy without waiting for each other inside every small matrix product.
+        threads = max(1, (os.cpu_count() or 1) // 2)
+        with ThreadPoolExecutor(1) as second, _threads(threads):
+            for _ in range(config.epochs):
+                for batch in rollout.minibatches(config.minibatches):
+                    policy.optimizer.zero_grad()
+                    value = second.submit(self._critic_backward, batch)
+                    figures = self._actor_backward(batch) | value.result()
+                    if not all(map(math.isfinite, figures.values())):
+                        raise OmniEnvsError(
+                            f"Training diverged after {self.num_timesteps} steps: {figures}. "
+                            "Resume from a checkpoint with a smaller learning rate."
+                        )
+                    self._adapt_learning_rate(figures["kl"])
+                    nn.utils.clip_grad_norm_(policy.parameters(), config.max_grad_norm)
+                    policy.optimizer.step()
+                    totals.update(figures)
+                self._n_updates += 1
+        for name, total in totals.items():
+            self.logger.record(f"train/{name}", total / (config.epochs * config.minibatches))
+        self.logger.record("train/learning_rate", self.current_learning_rate)
+        self.logger.record("train/std", policy.log_std.exp().mean().item())
+
+    def _actor_backward(self, batch: Rollout) -> dict[str, float]:
+        """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
+        clip = self.config.clip
+        now = self.policy.get_distribution(batch.observations).distribution
+        log_probability = now.log_prob(batch.actions).sum(dim=-1)
+        ratio = torch.exp(log_probability - batch.log_probability)
+        clipped = ratio.clamp(1.0 - clip, 1.0 + clip)
+        surrogate = -torch.min(ratio * batch.advantages, clipped * batch.advantages).mean()
+        entropy = now.entropy().sum(dim=-1).mean()
+        (surrogate - self.config.entropy_weight * entropy).backward()
+        with torch.no_grad():
+            kl = _gaussian_kl(batch.mean, batch.std, now.mean, now.stddev)
+        return {
+            "kl": kl.item(),
+            "surrogate_loss": surrogate.item(),
+            "entropy": entropy.item(),
+            "clip_fraction": (ratio != clipped).float().mean().item(),
+        }
+
+    def _critic_backward(self, batch: Rollout) -> dict[str, float]:
+        """Adds the gradient of the value loss, the larger of the plain and the clipped one."""
+        values = self.policy.predict_values(batch.observations).flatten()
+        loss = _value_loss(values, batch.values, batch.returns, self.config.value_clip)
+        (self.config.value_weight * loss).backward()
+        return {"value_loss": loss.item()}
+
+    def _adapt_learning_rate(self, kl: float) -> None:
+        rate, desired = self.current_learning_rate, self.config.desired_kl
+        if desired and kl > 2.0 * desired:
+            rate = max(MIN_LEARNING_RATE, rate / 1.5)
+        elif desired and 0.0 < kl < 0.5 * desired:
+            rate = min(MAX_LEARNING_RATE, rate * 1.5)
+        self.current_learning_rate = rate
+        for group in self.policy.optimizer.param_groups:
+            group["lr"] = rate
+
+
+def _take(value: Any, index: Tensor) -> Any:
+    if isinstance(value, dict):
+        return {key: tensor[index] for key, tensor in value.items()}
+    return None if value is None else value[index]
+
+
+def _value_loss(values: Tensor, old_values: Tensor, returns: Tensor, clip: float) -> Tensor:
+    loss = (values - returns) ** 2
+    if clip:
+        clipped = old_values + (values - old_values).clamp(-clip, clip)
+        loss = torch.max(loss, (clipped - returns) ** 2)
+    return loss.mean()
+
+
+def _gaussian_kl(mean: Tensor, std: Tensor, new_mean: Tensor, new_std: Tensor) -> Tensor:
+    """Mean over samples of KL(old ‖ new) of diagonal Gaussians."""
+    terms = torch.log(new_std / std) + (std**2 + (mean - new_mean) ** 2) / (2.0 * new_std**2) - 0.5
+    return terms.sum(dim=-1).mean()
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,76 @@
+import dataclasses
+import json
+from pathlib import Path
+
+import pytest
+
+from omni_envs.errors import FileFormatError, InvalidOptionError
+from omni_envs.training.config import PPOConfig, TrainConfig
+
+
+def _config(tmp_path: Path) -> TrainConfig:
+    return TrainConfig(
+        env="OmniEnvs/G1BoxCarry-v0",
+        out=tmp_path / "run",
+        steps=1000,
+        env_options={"action": {"mode": "residual"}},
+        ppo=PPOConfig(hidden=(64, 32), value_clip=0.0),
+    )
+
+
+def test_defaults_are_the_published_ones():
+    assert dataclasses.asdict(PPOConfig()) == {
+        "rollout_steps": 24,
+        "epochs": 5,
+        "minibatches": 4,
+        "learning_rate": 1e-3,
+        "desired_kl": 0.01,
+        "gamma": 0.99,
+        "gae_lambda": 0.95,
+        "clip": 0.2,
+        "value_clip": 0.2,
+        "value_weight": 1.0,
+        "entropy_weight": 0.005,
+        "max_grad_norm": 1.0,
+        "hidden": (512, 256, 128),
+        "initial_std": 1.0,
+    }
+
+
+def test_round_trip_through_the_run_directory(tmp_path):
+    config = _config(tmp_path)
+    config.save()
+    assert TrainConfig.load(config.out) == config
+
+
+def test_a_run_directory_may_be_moved(tmp_path):
+    config = _config(tmp_path)
+    config.save()
+    moved = config.out.rename(tmp_path / "elsewhere")
+    assert TrainConfig.load(moved).out == moved
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"stesp": 3}, r"unknown \['stesp'\]. Valid: .*steps"),
+        ({"ppo": {"gama": 0.9}}, r"TrainConfig.ppo: unknown \['gama'\]"),
+        ({"steps": 0}, "steps must be positive; got 0"),
+        ({"trainer": "rllib"}, "trainer must be 'sb3'; got 'rllib'"),
+        ({"ppo": {"hidden": []}}, "hidden must be widths"),
+        ({"ppo": {"epochs": -1}}, "epochs must be positive"),
+    ],
+)
+def test_bad_values_are_one_clear_error(tmp_path, change, message):
+    data = {**_config(tmp_path).to_dict(), **change}
+    with pytest.raises(InvalidOptionError, match=message):
+        TrainConfig.from_dict(data)
+
+
+def test_missing_or_damaged_files_are_one_clear_error(tmp_path):
+    with pytest.raises(FileFormatError, match="nothing"):
+        TrainConfig.load(tmp_path)
+    for text in ("{", "[]", json.dumps({"env": "x"})):
+        (tmp_path / "config.json").write_text(text)
+        with pytest.raises(FileFormatError, match=r"config\.json: content"):
+            TrainConfig.load(tmp_path)
