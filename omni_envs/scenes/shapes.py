@@ -121,10 +121,11 @@ def load_convex_parts(path: str | Path, max_depth: float = 0.1) -> tuple[Part, .
             hull = trimesh.Trimesh(points).convex_hull
         except Exception as error:  # qhull on flat input
             raise FileFormatError(path, f"piece {i}", "a positive volume", "a flat one") from error
-        smallest = float(np.min(trimesh.bounds.oriented_bounds(hull)[1]))
-        if hull.volume < 1e-9 or smallest < 1e-6:
+        if hull.volume < 1e-9 or np.min(hull.extents) < 1e-6:
             raise FileFormatError(path, f"piece {i}", "a positive volume", f"{hull.volume:.3g} m³")
-        depth = _depth_below(hull, np.vstack([surface, points]))
+        part = _convex_part(hull)
+        smallest = float(np.min(trimesh.bounds.oriented_bounds(part.mesh())[1]))
+        depth = _depth_below(part.mesh(), np.vstack([surface, points]))
         if depth > max_depth * smallest:
             raise FileFormatError(
                 path,
@@ -132,13 +133,16 @@ def load_convex_parts(path: str | Path, max_depth: float = 0.1) -> tuple[Part, .
                 f"a convex piece (dents at most {max_depth:.0%} of its smallest extent)",
                 f"a surface {depth:.3f} m below its hull, {depth / smallest:.0%}",
             )
-        parts.append(_convex_part(hull))
+        parts.append(part)
     return tuple(parts)
 
 
 def _pieces(mesh: trimesh.Trimesh) -> list[tuple[bool, np.ndarray, np.ndarray]]:
     """Splits into (closed, surface samples, vertices) per piece; debris joins the nearest one."""
     extent = np.linalg.norm(mesh.extents)
+    # Scans have edges with four faces; only an edge with a single face is a hole.
+    _, edge, uses = np.unique(mesh.edges_sorted, axis=0, return_inverse=True, return_counts=True)
+    hole = (uses[edge.reshape(-1)] == 1).reshape(-1, 3).any(axis=1)
     labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, len(mesh.faces))
     small, large, closed = [], [], []
     for label in range(labels.max() + 1):
@@ -149,9 +153,7 @@ def _pieces(mesh: trimesh.Trimesh) -> list[tuple[bool, np.ndarray, np.ndarray]]:
             small.append(triangles)
             continue
         large.append(triangles)
-        edges = np.sort(mesh.faces[faces][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-        # Scans have edges with four faces; only an edge with a single face is a hole.
-        closed.append(bool(np.unique(edges, axis=0, return_counts=True)[1].min() > 1))
+        closed.append(not hole[faces].any())
     vertices = [[t.reshape(-1, 3)] for t in large]
     low = np.array([v[0].min(0) for v in vertices])
     high = np.array([v[0].max(0) for v in vertices])
@@ -175,24 +177,10 @@ def _depth_below(hull: trimesh.Trimesh, points: np.ndarray) -> float:
     return float(depth.max())
 
 
-def _height_above(hull: ConvexHull, points: np.ndarray) -> np.ndarray:
-    """(P,) how far each of (P, 3) points is beyond the farthest face plane of a hull, m."""
-    return np.max(points @ hull.equations[:, :3].T + hull.equations[:, 3], axis=1)
-
-
-def _convex_part(
-    hull: trimesh.Trimesh,
-    box_error: float = 1e-3,
-    hull_error: float = 2e-4,
-    max_vertices: int = 256,
-) -> Part:
-    """A box where the hull is one to ``box_error`` (m), else the hull, thinned.
-
-    Vertices are dropped as long as the hull stays within ``hull_error`` (m), and beyond
-    ``max_vertices`` in any case.
-    """
-    vertices = np.array(hull.vertices)
-    true_hull = ConvexHull(vertices)
+def _convex_part(hull: trimesh.Trimesh, box_error: float = 1e-3) -> Part:
+    """A box where the hull is one to ``box_error`` (m), else the thinned hull."""
+    hull = _thinned(hull)
+    planes = ConvexHull(hull.vertices).equations
     signs = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
     to_box, size = trimesh.bounds.oriented_bounds(hull)
     centred = np.mean(hull.bounds, axis=0), np.eye(3), hull.extents
@@ -201,30 +189,42 @@ def _convex_part(
         (np.linalg.inv(to_box)[:3, 3], *_least_rotation(to_box[:3, :3].T, size)),
     ):
         corners = centre + (0.5 * signs * extents) @ rotation.T
-        if np.max(_height_above(true_hull, corners)) <= box_error:
+        if np.max(corners @ planes[:, :3].T + planes[:, 3]) <= box_error:
             quaternion = trimesh.transformations.quaternion_from_matrix(rotation)
             return Part(
                 Box(tuple(float(e) / 2 for e in extents)),  # type: ignore[arg-type]
                 tuple(map(float, centre)),  # type: ignore[arg-type]
                 tuple(map(float, quaternion)),  # type: ignore[arg-type]
             )
-    if len(vertices) > 32:
-        # Keep the vertices that matter: start with the extremes, add the one farthest outside.
-        directions = trimesh.creation.icosphere(subdivisions=1).vertices
-        thin = ConvexHull(
-            vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))], incremental=True
-        )
-        candidates = vertices
-        while len(thin.vertices) < max_vertices:
-            outside = _height_above(thin, candidates)
-            if np.max(outside, initial=0.0) <= hull_error:
-                break
-            farthest = candidates[[np.argmax(outside)]]
-            # The hull only grows: what is inside now stays inside.
-            candidates = candidates[(outside > hull_error) & (candidates != farthest).any(axis=1)]
-            thin.add_points(farthest)
-        hull = trimesh.Trimesh(thin.points[thin.vertices]).convex_hull
     return Part(ConvexMesh(np.array(hull.vertices), np.array(hull.faces)))
+
+
+def _thinned(
+    hull: trimesh.Trimesh, error: float = 2e-4, max_vertices: int = 256
+) -> trimesh.Trimesh:
+    """Drops vertices while the hull stays within ``error`` (m), and beyond ``max_vertices``."""
+    vertices = np.array(hull.vertices)
+    if len(vertices) <= 32:
+        return hull
+    # Start with the extremes in 42 directions, then add the farthest vertex outside each face.
+    directions = trimesh.creation.icosphere(subdivisions=1).vertices
+    thin = ConvexHull(
+        vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))], incremental=True
+    )
+    while len(thin.vertices) < max_vertices:
+        heights = vertices @ thin.equations[:, :3].T + thin.equations[:, 3]
+        face, height = np.argmax(heights, axis=1), np.max(heights, axis=1)
+        outside = height > error
+        if not outside.any():
+            break
+        order = np.flatnonzero(outside)[np.argsort(-height[outside])]
+        _, first = np.unique(face[order], return_index=True)
+        farthest = order[np.sort(first)][: min(8, max_vertices - len(thin.vertices))]
+        thin.add_points(vertices[farthest])
+        # The hull only grows: what is inside now stays inside.
+        outside[farthest] = False
+        vertices = vertices[outside]
+    return trimesh.Trimesh(thin.points[thin.vertices]).convex_hull
 
 
 def _least_rotation(rotation: np.ndarray, extents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
