@@ -41,8 +41,8 @@ class Rollout:
         values: (B,) predicted when the actions were taken.
         returns: (B,) λ-returns.
         advantages: (B,) normalised to mean 0 and deviation 1 over the rollout.
-        mean: (B, n) of the policy that acted; filled in at the update.
-        std: (B, n) of the policy that acted; filled in at the update.
+        mean: (B, n) of the policy that acted.
+        std: (B, n) of the policy that acted.
     """
 
     observations: Tensor | dict[str, Tensor]
@@ -51,8 +51,8 @@ class Rollout:
     values: Tensor
     returns: Tensor
     advantages: Tensor
-    mean: Tensor | None = None
-    std: Tensor | None = None
+    mean: Tensor
+    std: Tensor
 
     def minibatches(self, count: int) -> Iterator[Rollout]:
         """Yields ``count`` random parts, every sample in exactly one."""
@@ -133,22 +133,24 @@ class TrackingPPO(PPO):
             return torch.from_numpy(array).flatten(0, 1)
 
         seen = buffer.observations
+        seen = {k: flat(v) for k, v in seen.items()} if isinstance(seen, dict) else flat(seen)
+        with torch.no_grad():
+            acted = self.policy.get_distribution(seen).distribution
         advantages = flat(buffer.advantages)
         return Rollout(
-            {k: flat(v) for k, v in seen.items()} if isinstance(seen, dict) else flat(seen),
+            seen,
             flat(buffer.actions),
             flat(buffer.log_probs),
             flat(buffer.values),
             flat(buffer.returns),
             (advantages - advantages.mean()) / (advantages.std() + 1e-8),
+            acted.mean,
+            acted.stddev,
         )
 
     def _update(self, rollout: Rollout) -> None:
         config, policy = self.config, self.policy
         policy.set_training_mode(True)
-        with torch.no_grad():
-            before = policy.get_distribution(rollout.observations).distribution
-            rollout.mean, rollout.std = before.mean, before.stddev
         totals: Counter[str] = Counter()
         # Actor and critic share no weights: each learns in its own thread, so that two cores are
         # busy without waiting for each other inside every small matrix product.
@@ -214,7 +216,7 @@ class TrackingPPO(PPO):
 def _take(value: Any, index: Tensor) -> Any:
     if isinstance(value, dict):
         return {key: tensor[index] for key, tensor in value.items()}
-    return None if value is None else value[index]
+    return value[index]
 
 
 def _value_loss(values: Tensor, old_values: Tensor, returns: Tensor, clip: float) -> Tensor:
