@@ -20,6 +20,7 @@ from typing import Any
 
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor, nn
 
@@ -67,7 +68,12 @@ class TrackingPPO(PPO):
         env: SB3 vector environment.
         config: Hyper-parameters.
         seed: Seed of network, exploration and environment.
-        tensorboard_log: Folder of the TensorBoard log, None = no log.
+
+    Attributes:
+        current_learning_rate: Learning rate of the next gradient step.
+        figures: Figures of the newest update: ``kl``, ``surrogate_loss``, ``value_loss``,
+            ``entropy``, ``clip_fraction``, ``learning_rate``, ``action_std``. SB3's own logger
+            writes nothing unless ``set_logger`` gives it an output.
     """
 
     policy: TrackingPolicy
@@ -77,7 +83,6 @@ class TrackingPPO(PPO):
         env: VecEnv,
         config: PPOConfig | None = None,
         seed: int | None = None,
-        tensorboard_log: str | None = None,
     ) -> None:
         config = config or PPOConfig()
         self.config = config
@@ -100,12 +105,13 @@ class TrackingPPO(PPO):
                 "initial_std": config.initial_std,
                 "optimizer_kwargs": {"fused": True},
             },
-            tensorboard_log=tensorboard_log,
             seed=seed,
             device="cpu",
             stats_window_size=max(100, env.num_envs),
         )
+        self.set_logger(Logger(None, []))
         self.current_learning_rate = config.learning_rate
+        self.figures: dict[str, float] = {}
 
     def collect_rollouts(self, *args: Any, **kwargs: Any) -> bool:
         """Collects a rollout with one thread for the network: the cores belong to the physics."""
@@ -171,10 +177,12 @@ class TrackingPPO(PPO):
                     policy.optimizer.step()
                     totals.update(figures)
                 self._n_updates += 1
-        for name, total in totals.items():
-            self.logger.record(f"train/{name}", total / (config.epochs * config.minibatches))
-        self.logger.record("train/learning_rate", self.current_learning_rate)
-        self.logger.record("train/std", policy.log_std.exp().mean().item())
+        steps = config.epochs * config.minibatches
+        self.figures = {
+            **{name: total / steps for name, total in totals.items()},
+            "learning_rate": self.current_learning_rate,
+            "action_std": policy.log_std.exp().mean().item(),
+        }
 
     def _actor_backward(self, batch: Rollout) -> dict[str, float]:
         """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""

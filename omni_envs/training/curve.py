@@ -1,0 +1,68 @@
+"""The learning curve of a run, as numbers and as a picture."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from omni_envs.errors import InvalidDataError, MissingDependencyError
+
+History = Sequence[dict[str, float]]
+
+CURVE_CSV, CURVE_PNG = "curve.csv", "curve.png"
+
+
+def write_history(run: Path, history: History) -> Path:
+    """Writes one row per update as ``curve.csv``, atomically."""
+    path = run / CURVE_CSV
+    partial = path.with_suffix(f".{os.getpid()}.partial")
+    names = list(dict.fromkeys(name for row in history for name in row))
+    with partial.open("w", newline="") as file:
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(history)
+    partial.replace(path)
+    return path
+
+
+def plot_curve(run: Path, history: History, control_dt: float) -> Path:
+    """Draws episode length, return and tracking error over the steps trained for.
+
+    Args:
+        run: Run directory; ``curve.png`` is written there.
+        history: Rows of ``RunResult.history``.
+        control_dt: Seconds per control step.
+
+    Raises:
+        InvalidDataError: There is nothing to draw.
+        MissingDependencyError: Matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingDependencyError("matplotlib", "viewer", "Drawing a curve") from error
+    if not history:
+        raise InvalidDataError("Learning curve", "history", "at least one update", "none")
+    steps = [row["steps"] / 1e6 for row in history]
+    figure = Figure(figsize=(12, 3.4), layout="constrained")
+    for axes, (key, title, scale) in zip(
+        figure.subplots(1, 3),
+        (
+            ("episode_length", "episode length (s)", control_dt),
+            ("episode_return", "return per episode", 1.0),
+            ("body_error_m", "mean body position error (cm)", 100.0),
+        ),
+        strict=True,
+    ):
+        axes.plot(steps, [row[key] * scale for row in history], color="#1f5fa8", linewidth=1.6)
+        axes.set_xlabel("control steps (million)")
+        axes.set_title(title, fontsize=10)
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    minutes = history[-1]["seconds"] / 60
+    figure.suptitle(f"{steps[-1]:.2f} M control steps in {minutes:.1f} minutes", fontsize=11)
+    path = run / CURVE_PNG
+    figure.savefig(path, dpi=120)
+    return path

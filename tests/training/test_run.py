@@ -1,0 +1,136 @@
+import csv
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+pytest.importorskip("stable_baselines3")
+import torch
+
+from omni_envs.errors import FileFormatError, InvalidOptionError
+from omni_envs.training.checkpoint import Checkpoint, checkpoints
+from omni_envs.training.config import PPOConfig, TrainConfig
+from omni_envs.training.run import train
+
+ROLLOUT = 8 * 16
+
+
+def _config(out, steps: int = 4 * ROLLOUT, **changes) -> TrainConfig:
+    ppo = PPOConfig(rollout_steps=8, epochs=2, minibatches=2, hidden=(16,))
+    fields = {"env": "Chase", "out": out, "steps": steps, "num_envs": 16, "ppo": ppo}
+    return TrainConfig(**{**fields, **changes})
+
+
+def _policy(out):
+    return Checkpoint.load(checkpoints(out)[-1]).policy
+
+
+def _same(one, two) -> bool:
+    return all(torch.equal(one[key], two[key]) for key in one)
+
+
+def test_a_run_directory_holds_what_it_should(chase, tmp_path):
+    result = train(_config(tmp_path, checkpoint_every=2), env=chase(16))
+    assert result.steps == 4 * ROLLOUT and len(result.history) == 4
+    assert TrainConfig.load(tmp_path) == _config(tmp_path, checkpoint_every=2)
+    steps = [Checkpoint.load(p).steps for p in checkpoints(tmp_path)]
+    assert steps == [0, 2 * ROLLOUT, 4 * ROLLOUT]
+    assert any((tmp_path / "tensorboard").iterdir())
+    with (tmp_path / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(r["steps"]) for r in rows] == [r["steps"] for r in result.history]
+    assert 0 < result.history[-1]["episode_length"] <= 20
+    assert result.history[-1]["kl"] > 0
+    assert 0 < result.history[-1]["body_error_m"] < 1.5
+
+
+def test_a_resumed_run_goes_on_from_the_last_checkpoint(chase, tmp_path):
+    train(_config(tmp_path), env=chase(16))
+    first = _policy(tmp_path)
+    longer = train(_config(tmp_path, 6 * ROLLOUT), resume=True, env=chase(16))
+    assert longer.steps == 6 * ROLLOUT
+    assert [row["steps"] for row in longer.history] == [k * ROLLOUT for k in range(1, 7)]
+    seconds = [row["seconds"] for row in longer.history]
+    assert seconds == sorted(seconds)
+    assert not _same(first, _policy(tmp_path))
+
+
+def test_resuming_a_finished_run_changes_nothing(chase, tmp_path):
+    train(_config(tmp_path), env=chase(16))
+    first = _policy(tmp_path)
+    again = train(_config(tmp_path), resume=True, env=chase(16))
+    assert again.steps == 4 * ROLLOUT and _same(first, _policy(tmp_path))
+
+
+def test_resuming_twice_gives_the_same_weights(chase, tmp_path):
+    policies = []
+    for name in ("one", "two"):
+        train(_config(tmp_path / name), env=chase(16))
+        train(_config(tmp_path / name, 6 * ROLLOUT), resume=True, env=chase(16))
+        policies.append(_policy(tmp_path / name))
+    assert _same(*policies)
+
+
+def test_time_limit_ends_the_run(chase, tmp_path):
+    result = train(_config(tmp_path, 10**9, time_limit=0.3), env=chase(16))
+    assert 0.3 <= result.seconds < 3.0
+    assert Checkpoint.load(checkpoints(tmp_path)[-1]).steps == result.steps
+
+
+def test_a_run_directory_in_use_is_not_overwritten(chase, tmp_path):
+    train(_config(tmp_path), env=chase(16))
+    with pytest.raises(InvalidOptionError, match="already holds a training run"):
+        train(_config(tmp_path), env=chase(16))
+    with pytest.raises(InvalidOptionError, match="no checkpoint to resume"):
+        train(_config(tmp_path / "new"), resume=True, env=chase(16))
+
+
+def test_a_cut_checkpoint_is_one_clear_error(chase, tmp_path):
+    train(_config(tmp_path), env=chase(16))
+    last = checkpoints(tmp_path)[-1]
+    last.write_bytes(last.read_bytes()[:200])
+    with pytest.raises(FileFormatError, match=last.name):
+        train(_config(tmp_path), resume=True, env=chase(16))
+
+
+def test_progress_is_lines_where_there_is_no_terminal(chase, tmp_path, capsys):
+    train(_config(tmp_path / "shown"), progress=True, env=chase(16))
+    shown = capsys.readouterr().err
+    assert "steps/s" in shown and "100%" in shown and "episode" in shown and "error" in shown
+    train(_config(tmp_path / "quiet"), progress=False, env=chase(16))
+    assert capsys.readouterr().err == ""
+
+
+TRAINEE = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from conftest import Chase
+from pathlib import Path
+from omni_envs.training.config import PPOConfig, TrainConfig
+from omni_envs.training.run import train
+ppo = PPOConfig(rollout_steps=8, epochs=2, minibatches=2, hidden=(16,))
+config = TrainConfig("Chase", Path(sys.argv[1]), 10**9, num_envs=16, checkpoint_every=1, ppo=ppo)
+train(config, env=Chase(16))
+"""
+
+
+def test_a_killed_run_resumes(chase, tmp_path):
+    command = [sys.executable, "-c", TRAINEE, str(tmp_path), os.path.dirname(__file__)]
+    trainee = subprocess.Popen(command)
+    try:
+        deadline = time.monotonic() + 60
+        while len(checkpoints(tmp_path)) < 3:
+            assert trainee.poll() is None and time.monotonic() < deadline
+            time.sleep(0.02)
+    finally:
+        trainee.send_signal(signal.SIGKILL)
+        trainee.wait()
+    reached = Checkpoint.load(checkpoints(tmp_path)[-1])
+    config = dataclasses.replace(TrainConfig.load(tmp_path), steps=reached.steps + 2 * ROLLOUT)
+    result = train(config, resume=True, env=chase(16))
+    assert result.steps == reached.steps + 2 * ROLLOUT
+    assert repr(list(result.history[:-2])) == repr(reached.history)  # NaN is not equal to itself
