@@ -26,10 +26,10 @@ class Demonstration:
         scene: Object and terrain at human scale.
         object_poses: (T, 7) object position (m) and quaternion wxyz, or None without object.
         orientations: (T, J, 4) world joint orientations wxyz, if the source has them.
-        contacts: Link of ``CONTACT_LINKS`` to (T,) bool: where the source itself flags contact. Links
-            without an entry get their contact from distances.
-        contact_joints: Link of ``CONTACT_LINKS`` to the joints whose distance decides contact (a hand and
-            its fingers, a toe and a heel).
+        contacts: Link of ``CONTACT_LINKS`` to (T,) bool: where the source itself flags contact.
+            Links without an entry get their contact from distances.
+        contact_joints: Link of ``CONTACT_LINKS`` to the joints whose distance decides contact (a
+            hand and its fingers, a toe and a heel).
         source: Where the motion comes from.
         licence: Terms of the source.
     """
@@ -113,4 +113,4 @@ class Demonstration:
 
 
 def _first(mask: np.ndarray) -> tuple[int, ...]:
-    return tuple(int(i) for i in np.argwhere(mask)[0])
+    return tuple(int(i) for i in np.argwhere(mask)[0]) if mask.any() else ()
