@@ -7,8 +7,9 @@ from functools import cached_property
 import mink
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
-from omni_envs.robots import KEYPOINTS, SIDES, Robot
+from omni_envs.robots import KEYPOINTS, SIDES, Foot, Robot
 from omni_envs.robots.self_collision import resting_pairs
 from omni_envs.scenes import OBJECT, Scene, build_spec
 
@@ -16,7 +17,7 @@ from omni_envs.scenes import OBJECT, Scene, build_spec
 class Points:
     """A fixed set of K points of the robot: body ids and offsets in the body frames (m)."""
 
-    def __init__(self, model: mujoco.MjModel, bodies: list[str], offsets: np.ndarray) -> None:
+    def __init__(self, model: mujoco.MjModel, bodies: list[str], offsets: ArrayLike) -> None:
         self.bodies = np.array([model.body(name).id for name in bodies])
         self.offsets = np.asarray(offsets, float).reshape(-1, 3)
 
@@ -62,9 +63,9 @@ class Kinematics(mink.Configuration):
             [foot.body for foot in feet for _ in foot.sole],
             np.array([p for foot in feet for p in foot.sole]),
         )
-        self.sole_count = len(feet[0].sole)
+        self._tips = Points(model, [foot.body for foot in feet], [foot.sole[-1] for foot in feet])
+        self._lateral_axes = np.array([_lateral_axis(foot) for foot in feet])
         self._root = int(model.body(robot.root_body).id)
-        self.root_quaternion = slice(3, 7)
 
     @cached_property
     def metric(self) -> np.ndarray:
@@ -123,10 +124,22 @@ class Kinematics(mink.Configuration):
         """(2, K, 3) world sole points, left foot first."""
         return self.positions(self._soles).reshape(2, -1, 3)
 
-    def sole_jacobians(self, positions: np.ndarray) -> np.ndarray:
-        """(3, 2, K, nv) Jacobians of the sole points."""
-        jacobian = self.jacobians(self._soles, positions.reshape(-1, 3))
-        return jacobian.reshape(3, 2, -1, self.model.nv)
+    def feet(self) -> tuple[np.ndarray, np.ndarray]:
+        """(2, 3) toe tips and (2, 3) unit axes to the left of the feet, left foot first."""
+        rotation = self.data.xmat[self._tips.bodies].reshape(-1, 3, 3)
+        lateral = (rotation @ self._lateral_axes[:, :, None])[:, :, 0]
+        return self.positions(self._tips), lateral
+
+    def feet_jacobians(self, tips: np.ndarray, lateral: np.ndarray) -> np.ndarray:
+        """(2, 2, 2, nv) Jacobians: foot; toe tip or lateral axis; horizontal coordinate."""
+        wx, wy, wz = self.data.cdof[:, :3].T
+        jacobian = np.empty((2, 2, 2, len(wx)))
+        jacobian[:, 0] = np.moveaxis(self.jacobians(self._tips, tips)[:2], 0, 1)
+        mask = self.ancestors[self._tips.bodies]
+        x, y, z = lateral[:, 0:1], lateral[:, 1:2], lateral[:, 2:3]
+        jacobian[:, 1, 0] = (wy * z - wz * y) * mask
+        jacobian[:, 1, 1] = (wz * x - wx * z) * mask
+        return jacobian
 
     def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""
@@ -139,6 +152,13 @@ class Kinematics(mink.Configuration):
         wrench[:, 2] = ax * ny - ay * nx
         wrench[:, 3:] = normals
         return wrench @ self.data.cdof.T
+
+
+def _lateral_axis(foot: Foot) -> np.ndarray:
+    """(3,) unit axis to the left of a foot in its body frame, whose z axis is up."""
+    sole = np.array(foot.sole)
+    forward = sole[-1] - sole[:-1].mean(axis=0)
+    return np.array([-forward[1], forward[0], 0.0]) / np.hypot(forward[0], forward[1])
 
 
 def _compile(

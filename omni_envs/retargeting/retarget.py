@@ -27,15 +27,22 @@ from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
 from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.limits import RowLimit
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
-from omni_envs.retargeting.stance_limit import ANCHORED, FREE, LOOSE, StanceLimit
-from omni_envs.robots import Robot
+from omni_envs.retargeting.stance_limit import StanceLimit
+from omni_envs.retargeting.stance_plan import (
+    StancePlan,
+    plan_stance,
+    stance_tiers,
+)
+from omni_envs.robots import KEYPOINTS, SIDES, Robot
 
 # Stance windows are wider than what counts as relaxed by this much: numerical slack of the last step.
 _RELAXED = 2e-4
+_STRIDE = 5
 
 
 def retarget(
@@ -107,19 +114,6 @@ def keypoint_positions(robot: Robot, source: SourceMotion, qpos: np.ndarray) -> 
     return keypoints
 
 
-def stance_tiers(source: SourceMotion, options: RetargetOptions) -> np.ndarray:
-    """(T, 2) tier of each foot on each frame: ``FREE``, ``LOOSE`` or ``ANCHORED``.
-
-    A foot is held from the second frame of a stance interval on; the first fixes where.
-    """
-    tiers = np.full((source.num_frames, 2), FREE)
-    for tier, mode in ((LOOSE, options.stance.loose), (ANCHORED, options.stance.anchored)):
-        if mode is not None:
-            flags = source.stance[mode]
-            tiers[1:][flags[1:] & flags[:-1]] = tier
-    return tiers
-
-
 def _check(source: SourceMotion) -> None:
     owner = f"SourceMotion {source.name!r}"
     if source.num_frames < 1:
@@ -157,19 +151,16 @@ class _Retargeter:
         if options.velocity_limits is not None:
             self.velocity = StepVelocityLimit(robot, source.fps, options.velocity_limits)
             bounds.append(self.velocity)
-        self.contact = ContactLimit(options.penetration_tolerance)
-        self.stance = StanceLimit(options.stance.tolerance, options.stance.loose_speed / source.fps)
+        self.limits: list[RowLimit] = [ContactLimit(options.penetration_tolerance)]
         self.solver = FrameSolver(
             self.configuration,
             self.mesh,
             [self.smoothness, self.posture],
             bounds,
-            [self.contact, self.stance],
+            self.limits,
             solve_daqp,
             options,
         )
-        self.tiers = stance_tiers(source, options)
-        self.anchors = np.zeros((2, self.configuration.sole_count, 3))
 
     def run(self, progress: ProgressCallback | None) -> Retargeted:
         frames = self.source.num_frames
@@ -177,16 +168,22 @@ class _Retargeter:
         energy, seconds = np.empty(frames), np.empty(frames)
         iterations = np.empty(frames, int)
         violations = np.empty((frames, len(RELAXATIONS)))
+        plan, previous = self._sketch()
+        stance = StanceLimit(plan, self.options.stance.tolerance)
+        self.limits.append(stance)
+        self.plan = plan
         for t in range(frames):
             start = perf_counter()
             self._place(t)
-            if t == 0:
-                result = self._first()
-            else:
-                result = self._next(t, qpos[t - 1])
+            self.smoothness.set_target(previous)
+            if t > 0 and self.velocity is not None:
+                self.velocity.set_previous(previous)
+            stance.hold(t)
+            result = self.solver.solve(previous, self.options.iterations, self.options.trust_region)
+            stance.record(self.configuration, t)
+            previous = result.q
             qpos[t], iterations[t], violations[t] = result.q, result.iterations, result.violations
             energy[t] = self.mesh.energy(self.configuration)
-            self._plant(t)
             seconds[t] = perf_counter() - start
             if progress is not None:
                 progress(t + 1, frames)
@@ -215,9 +212,10 @@ class _Retargeter:
             self.configuration.place_object(self.source.object_poses[t])
 
     def _first(self) -> FrameResult:
-        """The best of several starts: no previous frame, no speed limit, no stance, no trust region."""
+        """Frame 0 without stance: the best of several starts, without previous frame or trust region."""
         self.smoothness.set_target(None)
-        self.stance.release()
+        if self.velocity is not None:
+            self.velocity.set_previous(None)
         best: FrameResult | None = None
         lowest = np.inf
         for pose in aligned_poses(self.configuration, self.source.keypoints[0]):
@@ -226,18 +224,36 @@ class _Retargeter:
             if energy < lowest:
                 best, lowest = result, energy
         assert best is not None
-        self.configuration.update(best.q)
         return best
 
-    def _next(self, t: int, previous: np.ndarray) -> FrameResult:
-        """Frame t from the previous one."""
-        self.smoothness.set_target(previous)
-        if self.velocity is not None:
-            self.velocity.set_previous(previous)
-        self.stance.hold(self.anchors, self.tiers[t])
-        return self.solver.solve(previous, self.options.iterations, self.options.trust_region)
+    def _sketch(self) -> tuple[StancePlan, np.ndarray]:
+        """Solves every few frames without stance, and plans the footholds near where the feet went.
 
-    def _plant(self, t: int) -> None:
-        """Moves the anchor of every foot that frame t did not hold at it."""
-        moved = self.tiers[t] != ANCHORED
-        self.anchors[moved] = self.configuration.soles()[moved]
+        Returns:
+            The plan, and the (nq,) configuration of frame 0.
+        """
+        source = self.source
+        every = np.unique(
+            np.append(np.arange(0, source.num_frames, _STRIDE), source.num_frames - 1)
+        )
+        tips = np.empty((len(every), 2, 2))
+        for i, t in enumerate(every):
+            self._place(t)
+            if i == 0:
+                first = q = self._first().q
+                self.configuration.update(q)
+            else:
+                self.smoothness.set_target(q)
+                q = self.solver.solve(
+                    q, self.options.iterations, _STRIDE * self.options.trust_region
+                ).q
+            tips[i] = self.configuration.feet()[0][:, :2]
+        # Between these frames the feet follow the human's toes: the offset changes slowly.
+        human = source.keypoints[:, [KEYPOINTS.index(f"{side}_toe") for side in SIDES], :2]
+        offset = tips - human[every]
+        wishes = human.copy()
+        frames = np.arange(source.num_frames)
+        for foot, axis in np.ndindex(2, 2):
+            wishes[:, foot, axis] += np.interp(frames, every, offset[:, foot, axis])
+        tier = stance_tiers(source, self.options.stance)
+        return plan_stance(tier, wishes, source.fps, self.options.stance), first
