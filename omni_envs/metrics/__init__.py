@@ -1,5 +1,15 @@
 """How good a robot motion is."""
 
-from omni_envs.metrics.report import STANCE_MODES, ReferenceReport
+from omni_envs.metrics.evaluate import evaluate
+from omni_envs.metrics.paper import PaperFigures, paper_figures, paper_row
+from omni_envs.metrics.report import ReferenceReport
+from omni_envs.metrics.summary import summary_table
 
-__all__ = ["STANCE_MODES", "ReferenceReport"]
+__all__ = [
+    "PaperFigures",
+    "ReferenceReport",
+    "evaluate",
+    "paper_figures",
+    "paper_row",
+    "summary_table",
+]

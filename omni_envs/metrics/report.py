@@ -13,9 +13,6 @@ from omni_envs.errors import InvalidDataError
 if TYPE_CHECKING:
     from rich.table import Table
 
-STANCE_MODES = ("text", "default", "code")
-"""Stance sets, from strict to wide; ``demonstrations.stance`` defines them."""
-
 TOUCHING = 0.02
 """A link touches within this distance (m), unless said otherwise."""
 CLEAN = 0.01
@@ -51,6 +48,7 @@ class ReferenceReport:
         contact: Link to (T,) bool: the source touches object or terrain.
         contact_distance: Link to (T,) signed distance of the link to that surface, m, infinite
             beyond reach.
+        contact_depth: Link to (T,) depth of the link in any part of the surroundings, m.
         contact_gap: Link to (T,) distance from the point that the human touches to the link, m; NaN
             without contact or point.
         keypoint_error: (T,) mean distance of the robot's keypoints from the source's, m, or None.
@@ -71,6 +69,7 @@ class ReferenceReport:
     pivot_drift: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_distance: Mapping[str, np.ndarray] = field(default_factory=dict)
+    contact_depth: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_gap: Mapping[str, np.ndarray] = field(default_factory=dict)
     keypoint_error: np.ndarray | None = None
     energy: np.ndarray | None = None
@@ -87,6 +86,16 @@ class ReferenceReport:
     def num_frames(self) -> int:
         """T."""
         return len(self.joint_violation)
+
+    @property
+    def surroundings_penetration(self) -> np.ndarray:
+        """(T,) depth in object, terrain or ground, m."""
+        depths = [depth for target, depth in self.penetration.items() if target != "self"]
+        return np.max(depths, axis=0)
+
+    def planted_slip(self, mode: str) -> np.ndarray | None:
+        """Returns the slip of the foot-frames that count as planted in a stance set, m/s, flat."""
+        return self.slip[self.stance[mode]] if mode in self.stance else None
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Returns all figures as flat arrays, ``from_arrays`` reads them back."""
@@ -132,8 +141,14 @@ class ReferenceReport:
 
         return summarize(self)
 
-    def table(self, title: str = "") -> Table:
-        """Returns the summary as a table for people."""
-        from omni_envs.metrics.table import summary_table
+    def details(self) -> dict[str, float | int | None]:
+        """Returns all other figures: every column, threshold and link by itself."""
+        from omni_envs.metrics.summary import details
 
-        return summary_table({title: self.summary()})
+        return details(self)
+
+    def table(self, title: str = "") -> Table:
+        """Returns summary and details as a table for people."""
+        from omni_envs.metrics.summary import details, summarize, summary_table
+
+        return summary_table({title or "value": summarize(self) | details(self)})
