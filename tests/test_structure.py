@@ -13,6 +13,7 @@ PACKAGE = Path(__file__).parents[1] / "omni_envs"
 ORDER = (
     "errors",
     "rotations",
+    "resampling",
     "progress",
     "robots",
     "scenes",
