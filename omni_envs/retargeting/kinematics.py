@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from omni_envs.robots import KEYPOINTS, SIDES, Foot, Robot
+from omni_envs.robots import KEYPOINTS, SIDES, Robot
 from omni_envs.robots.self_collision import resting_pairs
 from omni_envs.scenes import OBJECT, Scene, build_spec
 
@@ -63,8 +63,11 @@ class Kinematics(mink.Configuration):
             [foot.body for foot in feet for _ in foot.sole],
             np.array([p for foot in feet for p in foot.sole]),
         )
-        self._tips = Points(model, [foot.body for foot in feet], [foot.sole[-1] for foot in feet])
-        self._lateral_axes = np.array([_lateral_axis(foot) for foot in feet])
+        self._feet = Points(
+            model,
+            [foot.body for foot in feet for _ in range(2)],
+            np.array([p for foot in feet for p in (foot.sole[-1], np.mean(foot.sole[:-1], axis=0))]),
+        )
         self._root = int(model.body(robot.root_body).id)
 
     @cached_property
@@ -124,22 +127,14 @@ class Kinematics(mink.Configuration):
         """(2, K, 3) world sole points, left foot first."""
         return self.positions(self._soles).reshape(2, -1, 3)
 
-    def feet(self) -> tuple[np.ndarray, np.ndarray]:
-        """(2, 3) toe tips and (2, 3) unit axes to the left of the feet, left foot first."""
-        rotation = self.data.xmat[self._tips.bodies].reshape(-1, 3, 3)
-        lateral = (rotation @ self._lateral_axes[:, :, None])[:, :, 0]
-        return self.positions(self._tips), lateral
+    def feet(self) -> np.ndarray:
+        """(2, 2, 3) toe tip and heart (mean corner) of each sole, left foot first."""
+        return self.positions(self._feet).reshape(2, 2, 3)
 
-    def feet_jacobians(self, tips: np.ndarray, lateral: np.ndarray) -> np.ndarray:
-        """(2, 2, 2, nv) Jacobians: foot; toe tip or lateral axis; horizontal coordinate."""
-        wx, wy, wz = self.data.cdof[:, :3].T
-        jacobian = np.empty((2, 2, 2, len(wx)))
-        jacobian[:, 0] = np.moveaxis(self.jacobians(self._tips, tips)[:2], 0, 1)
-        mask = self.ancestors[self._tips.bodies]
-        x, y, z = lateral[:, 0:1], lateral[:, 1:2], lateral[:, 2:3]
-        jacobian[:, 1, 0] = (wy * z - wz * y) * mask
-        jacobian[:, 1, 1] = (wz * x - wx * z) * mask
-        return jacobian
+    def feet_jacobians(self, feet: np.ndarray) -> np.ndarray:
+        """(2, 2, 2, nv) horizontal Jacobians: foot; tip or heart; x or y."""
+        jacobian = self.jacobians(self._feet, feet.reshape(4, 3))[:2]
+        return np.moveaxis(jacobian, 0, 1).reshape(2, 2, 2, -1)
 
     def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""
@@ -152,13 +147,6 @@ class Kinematics(mink.Configuration):
         wrench[:, 2] = ax * ny - ay * nx
         wrench[:, 3:] = normals
         return wrench @ self.data.cdof.T
-
-
-def _lateral_axis(foot: Foot) -> np.ndarray:
-    """(3,) unit axis to the left of a foot in its body frame, whose z axis is up."""
-    sole = np.array(foot.sole)
-    forward = sole[-1] - sole[:-1].mean(axis=0)
-    return np.array([-forward[1], forward[0], 0.0]) / np.hypot(forward[0], forward[1])
 
 
 def _compile(

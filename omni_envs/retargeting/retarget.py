@@ -169,7 +169,7 @@ class _Retargeter:
         iterations = np.empty(frames, int)
         violations = np.empty((frames, len(RELAXATIONS)))
         plan, previous = self._sketch()
-        stance = StanceLimit(plan, self.options.stance.tolerance)
+        stance = StanceLimit(plan)
         self.limits.append(stance)
         self.plan = plan
         for t in range(frames):
@@ -236,7 +236,7 @@ class _Retargeter:
         every = np.unique(
             np.append(np.arange(0, source.num_frames, _STRIDE), source.num_frames - 1)
         )
-        tips = np.empty((len(every), 2, 2))
+        feet = np.empty((len(every), 2, 2, 2))
         for i, t in enumerate(every):
             self._place(t)
             if i == 0:
@@ -247,13 +247,13 @@ class _Retargeter:
                 q = self.solver.solve(
                     q, self.options.iterations, _STRIDE * self.options.trust_region
                 ).q
-            tips[i] = self.configuration.feet()[0][:, :2]
+            feet[i] = self.configuration.feet()[:, :, :2]
         # Between these frames the feet follow the human's toes: the offset changes slowly.
         human = source.keypoints[:, [KEYPOINTS.index(f"{side}_toe") for side in SIDES], :2]
-        offset = tips - human[every]
-        wishes = human.copy()
+        offset = feet - human[every, :, None]
+        wishes = np.repeat(human[:, :, None], 2, axis=2)
         frames = np.arange(source.num_frames)
-        for foot, axis in np.ndindex(2, 2):
-            wishes[:, foot, axis] += np.interp(frames, every, offset[:, foot, axis])
+        for index in np.ndindex(offset.shape[1:]):
+            wishes[(..., *index)] += np.interp(frames, every, offset[(..., *index)])
         tier = stance_tiers(source, self.options.stance)
         return plan_stance(tier, wishes, source.fps, self.options.stance), first

@@ -6,59 +6,58 @@ import numpy as np
 
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import STANCE, RowLimit, Rows
-from omni_envs.retargeting.stance_plan import ANCHORED, FREE, StancePlan
-
-_ARM = 0.1  # m: the heading tolerance moves the heel about as far as the tip's tolerance the tip
+from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE, TIP, StancePlan
 
 
 class StanceLimit(RowLimit):
-    """Windows of toe tip and heading of both feet on the current frame of a plan.
+    """Windows of toe tip and heart of both soles on the current frame of a plan.
 
     An anchored foot keeps its **absolute** place: a window about the previous frame, as in the official
-    code, lets the foot creep. Tip and heading hold the whole foot but for rolling over the toes, which is
-    not slip; non-penetration holds the rest of the sole above the ground.
+    code, lets the foot creep. It may roll over its toes, which is not slip, where the plan does;
+    non-penetration holds the rest of the sole above the ground.
 
     Args:
         plan: Where the feet should be.
-        tolerance: Half width of the anchor window of a toe tip, m.
     """
 
-    def __init__(self, plan: StancePlan, tolerance: float) -> None:
+    def __init__(self, plan: StancePlan) -> None:
         self._plan = plan
-        self._tolerance = tolerance
-        self._anchors, self._lateral = np.zeros((2, 2)), np.zeros((2, 2))
+        self._anchors = np.zeros((2, 2, 2))
         self.release()
 
     def release(self) -> None:
         """Frees both feet."""
-        self._held = self._turning = np.zeros(0, int)
+        self._held = np.zeros((2, 2, 2), bool)
 
     def hold(self, t: int) -> None:
         """Chooses frame t of the plan. ``record`` must have been called on frame t - 1."""
-        plan = self._plan
-        slack = plan.slack[t][:, None]
-        lower, upper = plan.footholds[t] - slack, plan.footholds[t] + slack
-        stays = self._stays(t)
+        plan, stays = self._plan, self._stays(t)
+        axes, slack = plan.axes[t], plan.slack[t]
+        anchors = (axes @ self._anchors[..., None])[..., 0]
+        footholds = (axes @ plan.footholds[t][..., None])[..., 0]
+        centre = np.where(stays[:, None, None], anchors, footholds)
+        lower, upper = centre - slack, centre + slack
+        held = np.isfinite(slack)
+        held[:, TIP] |= (plan.tier[t] == LOOSE)[:, None]
         if t > 0:
             # Nowhere further than a step from the frame before, even if that misses the foothold.
-            step = plan.step[t][:, None]
-            np.clip(lower, self._anchors - step, self._anchors + step, out=lower)
-            np.clip(upper, self._anchors - step, self._anchors + step, out=upper)
-            free = (plan.tier[t] == FREE) & ~np.isfinite(plan.slack[t])
-            lower[free], upper[free] = -np.inf, np.inf
-            lower[stays] = self._anchors[stays] - self._tolerance
-            upper[stays] = self._anchors[stays] + self._tolerance
-        self._held = np.flatnonzero(np.isfinite(lower[:, 0]))
-        self._lower, self._upper = lower[self._held].ravel(), upper[self._held].ravel()
-        self._turning = np.flatnonzero(stays)
-        left = self._lateral[self._turning]
-        self._forward = np.stack([left[:, 1], -left[:, 0]], axis=-1)
+            step = np.where(stays[:, None], np.inf, plan.step[t])[:, :, None]
+            np.clip(lower, anchors - step, anchors + step, out=lower)
+            np.clip(upper, anchors - step, anchors + step, out=upper)
+        self._held = held & np.isfinite(lower)
+        self._axes = axes[self._held]
+        self._lower, self._upper = lower[self._held], upper[self._held]
 
     def record(self, configuration: Kinematics, t: int) -> None:
         """Remembers where frame t has put the feet, except those that it held in their place."""
-        moved = ~self._stays(t)
-        tips, lateral = configuration.feet()
-        self._anchors[moved], self._lateral[moved] = tips[moved, :2], lateral[moved, :2]
+        plan, stays = self._plan, self._stays(t)
+        places = configuration.feet()[:, :, :2]
+        # Where the foot has reached the planned place it keeps that, so that its window does not wander.
+        missed = (plan.axes[t] @ (places - plan.footholds[t])[..., None])[..., 0]
+        reached = (np.abs(missed) <= plan.slack[t] + 1e-4).all(axis=2)
+        reached &= (plan.tier[t] == ANCHORED)[:, None]
+        anchors = np.where(reached[..., None], plan.footholds[t], places)
+        self._anchors[~stays] = anchors[~stays]
 
     def _stays(self, t: int) -> np.ndarray:
         """(2,) whether each foot keeps the place of the frame before."""
@@ -66,21 +65,13 @@ class StanceLimit(RowLimit):
         return (tier[t] == ANCHORED) & (tier[t - 1] == ANCHORED) if t > 0 else np.zeros(2, bool)
 
     def rows(self, configuration: Kinematics) -> Rows | None:
-        """Returns two rows for a held tip and one for a held heading."""
-        if not len(self._held):
+        """Returns a row for every held axis of a point."""
+        if not self._held.any():
             return None
-        tips, lateral = configuration.feet()
-        jacobian = configuration.feet_jacobians(tips, lateral)
-        place = tips[self._held, :2].ravel()
-        # The lateral axis keeps a zero component along the heading.
-        turn = (self._forward * lateral[self._turning, :2]).sum(axis=1)
-        slack = self._tolerance / _ARM
-        A = np.concatenate(
-            [
-                jacobian[self._held, 0].reshape(-1, jacobian.shape[-1]),
-                (self._forward[:, :, None] * jacobian[self._turning, 1]).sum(axis=1),
-            ]
-        )
-        lower = np.concatenate([self._lower - place, -slack - turn])
-        upper = np.concatenate([self._upper - place, slack - turn])
-        return Rows(A, lower, upper, np.full(len(lower), STANCE))
+        feet = configuration.feet()
+        points = np.nonzero(self._held)[:2]
+        jacobian = configuration.feet_jacobians(feet)[points]
+        A = (self._axes[:, :, None] * jacobian).sum(axis=1)
+        place = (self._axes * feet[:, :, :2][points]).sum(axis=1)
+        kind = np.full(len(place), STANCE)
+        return Rows(A, self._lower - place, self._upper - place, kind)

@@ -4,8 +4,8 @@ Anchoring a foot where it happens to be when a stance begins puts it in the wron
 still settles. A foothold in the middle of where the foot would like to be over the whole interval costs a
 tenth of the deformation energy. So a coarse pass without stance finds the wishes, and the plan keeps
 
-* the toe tip of an *anchored* foot in one place, and ``StanceLimit`` its heading: the foot may roll over its
-  toes, but not slide or turn;
+* the toe tip of an *anchored* foot in one place, and the heart of its sole beside it: the foot may roll over
+  its toes, but not slide or turn; where the wish hardly rolls, neither does the plan;
 * the toe tip of a *loose* foot below a speed;
 * consecutive footholds within reach of each other.
 """
@@ -23,24 +23,34 @@ from omni_envs.retargeting.options import StanceOptions
 FREE, LOOSE, ANCHORED = 0, 1, 2
 """Tiers of a foot in a frame."""
 
+TIP, HEART = 0, 1
+"""Held points of a foot."""
+
 _DETOUR = 0.6  # m/s by which a free foot may be asked to leave its way for the next foothold
 _FUNNEL = 0.15  # m: no window wider than this
+_FLAT = 3e-3  # m: a stance whose arm from tip to heart changes less, seen from above, does not roll
+_UPRIGHT = 0.03  # m: a foot with a shorter arm stands on its toes and has no heading
 
 
 @dataclass(frozen=True, eq=False)
 class StancePlan:
-    """Where the toe tips should be.
+    """Where toe tip and heart of both feet should be.
+
+    Windows of the heart are along and across the foot, those of the tip along x and y.
 
     Attributes:
         tier: (T, 2) ``FREE``, ``LOOSE`` or ``ANCHORED``.
-        footholds: (T, 2, 2) horizontal place of the current or the next foothold of each toe tip, m.
-        slack: (T, 2) half width of the window about it, m, infinite for none: ``tolerance`` on the foothold,
+        footholds: (T, 2, 2, 2) horizontal place of tip and heart of each foot in the current or the next
+            interval, m.
+        axes: (T, 2, 2, 2, 2) axes of the windows: foot; tip or heart; axis; x and y of the axis.
+        slack: (T, 2, 2, 2) half width of the windows, m, infinite for none: the tolerance on the foothold,
             and before it what the foot can still go.
-        step: (T, 2) largest step of each toe tip since the previous frame, m, per axis.
+        step: (T, 2, 2) largest step of each point since the previous frame, m, per axis.
     """
 
     tier: np.ndarray
     footholds: np.ndarray
+    axes: np.ndarray
     slack: np.ndarray
     step: np.ndarray
 
@@ -63,25 +73,37 @@ def plan_stance(
 
     Args:
         tier: (T, 2) tier of each foot on each frame.
-        wishes: (T, 2, 2) horizontal places where the toe tips would be without stance, m.
+        wishes: (T, 2, 2, 2) horizontal places of tip and heart of each foot without stance, m.
         fps: Frames per second.
         options: Settings.
     """
-    footholds, slack = wishes.copy(), np.full(tier.shape, np.inf)
+    footholds, slack = wishes.copy(), np.full(wishes.shape, np.inf)
+    axes = np.broadcast_to(np.eye(2), (*wishes.shape, 2)).copy()
     slow = options.loose_speed / fps / np.sqrt(2.0)  # half side of the square inside the circle
     both_slow = np.zeros(tier.shape, bool)
     both_slow[1:] = (tier[1:] >= LOOSE) & (tier[:-1] >= LOOSE)
-    swing = np.abs(np.diff(wishes, axis=0, prepend=wishes[:1])).max(axis=2) + _DETOUR / fps
-    step = np.where(both_slow, slow, swing)
+    step = np.abs(np.diff(wishes, axis=0, prepend=wishes[:1])).max(axis=3) + _DETOUR / fps
+    step[:, :, TIP][both_slow] = slow
+    detour = np.full(len(tier), _DETOUR / fps)
     for foot in range(2):
         runs = _runs(tier[:, foot] == ANCHORED)
         if not runs:
             continue
         for axis in range(2):
-            footholds[:, foot, axis] = _footholds(runs, wishes[:, foot, axis], step[:, foot])
-        detour = np.where(both_slow[:, foot], slow, _DETOUR / fps)
-        slack[:, foot] = _funnel(runs, detour, options.tolerance)
-    return StancePlan(tier, footholds, slack, step)
+            footholds[:, foot, TIP, axis] = _footholds(
+                runs, wishes[:, foot, TIP, axis], step[:, foot, TIP]
+            )
+        arm = wishes[:, foot, HEART] - wishes[:, foot, TIP]
+        planned, length, change = _typical_arm(runs, arm)
+        footholds[:, foot, HEART] = footholds[:, foot, TIP] + planned
+        along = planned / np.maximum(length, 1e-9)[:, None]
+        axes[:, foot, HEART] = np.stack([along, along[:, ::-1] * [-1.0, 1.0]], axis=1)
+        to_tip = np.where(both_slow[:, foot], slow, detour)
+        slack[:, foot, TIP] = _funnel(runs, to_tip, options.tolerance)[:, None]
+        slack[:, foot, HEART] = _funnel(runs, detour, options.roll)[:, None]
+        slack[change > _FLAT, foot, HEART, 0] = np.inf
+        slack[length < _UPRIGHT, foot, HEART] = np.inf
+    return StancePlan(tier, footholds, axes, slack, step)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
@@ -90,45 +112,51 @@ def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _footholds(runs: list[tuple[int, int]], wish: np.ndarray, reach: np.ndarray) -> np.ndarray:
+def _footholds(runs: list[tuple[int, int]], wish: np.ndarray, step: np.ndarray) -> np.ndarray:
     """(T,) the foothold of the current or the next interval, for one coordinate.
 
-    minimise Σ_i n_i (F_i - mean of the wishes)² subject to |F_{i+1} - F_i| ≤ reach between them.
+    minimise Σ_i n_i (F_i - mean of the wishes)² subject to |F_{i+1} - F_i| ≤ the steps between them.
 
     Args:
         runs: Intervals of constant coordinate.
         wish: (T,) wished coordinate.
-        reach: (T,) largest change from the frame before.
+        step: (T,) largest change from the frame before.
     """
     count = np.array([end - start for start, end in runs], float)
-    mean = np.array([wish[start:end].mean() for start, end in runs])
-    between = np.array(
-        [
-            reach[b[0] : b[0] + 1].sum() + reach[a[1] : b[0]].sum()
-            for a, b in zip(runs, runs[1:], strict=False)
-        ]
-    )
-    holds = mean
-    if len(runs) > 1 and (np.abs(np.diff(mean)) > between).any():
-        n = len(runs)
-        difference = np.eye(n)[1:] - np.eye(n)[:-1]
-        solution, _, flag, _ = daqp.solve(
-            np.diag(count),
-            -count * mean,
-            difference,
-            between,
-            -between,
-            np.zeros(n - 1, np.intc),
+    holds = np.array([wish[start:end].mean() for start, end in runs])
+    gaps = zip(runs[:-1], runs[1:], strict=True)
+    reach = np.array([step[before[1] : after[0] + 1].sum() for before, after in gaps])
+    if (np.abs(np.diff(holds)) > reach).any():
+        eye = np.eye(len(runs))
+        sense = np.zeros(len(reach), np.intc)
+        holds, _, _, _ = daqp.solve(
+            np.diag(count), -count * holds, eye[1:] - eye[:-1], reach, -reach, sense
         )
-        holds = solution if flag > 0 else mean
-    # Every frame looks ahead to the next interval; frames after the last one keep its foothold.
-    plan = np.empty(len(wish))
-    start = 0
-    for (_, end), hold in zip(runs, holds, strict=True):
-        plan[start:end] = hold
-        start = end
-    plan[start:] = holds[-1]
-    return plan
+    return _look_ahead(runs, holds, len(wish))
+
+
+def _typical_arm(
+    runs: list[tuple[int, int]], arm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """From tip to heart in the current or the next interval.
+
+    Returns:
+        (T, 2) arm of mean direction and median length, (T,) its length, (T,) range of lengths.
+    """
+    length = np.linalg.norm(arm, axis=1)
+    mean = np.array([arm[start:end].mean(axis=0) for start, end in runs])
+    median = np.array([np.median(length[start:end]) for start, end in runs])
+    change = np.array([np.ptp(length[start:end]) for start, end in runs])
+    direction = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
+    parts = (direction * median[:, None], median, change)
+    planned, size, spread = (_look_ahead(runs, part, len(arm)) for part in parts)
+    return planned, size, spread
+
+
+def _look_ahead(runs: list[tuple[int, int]], values: np.ndarray, frames: int) -> np.ndarray:
+    """(T, …) the value of the current or the next run; after the last run, its own."""
+    following = np.searchsorted([end for _, end in runs], np.arange(frames), side="right")
+    return values[np.minimum(following, len(runs) - 1)]
 
 
 def _funnel(runs: list[tuple[int, int]], detour: np.ndarray, tolerance: float) -> np.ndarray:

@@ -161,11 +161,11 @@ def gmr_retarget(
         if progress is not None:
             progress(t + 1, frames)
     object_poses = source.object_poses
-    if object_poses is not None and scale == "table":
+    if demonstration.object_poses is not None and scale == "table":
         # The robot walks as far as the scale of the root says, and the object with it.
-        assert source.source_object_poses is not None
-        object_poses = source.source_object_poses.copy()
-        object_poses[:, :3] *= scales[0] / source.scale
+        rest = demonstration.object_poses[0, :3] * (0.0, 0.0, 1.0)
+        object_poses = demonstration.object_poses.copy()
+        object_poses[:, :3] = scales[0] * (object_poses[:, :3] - rest) + rest
     return GmrMotion(robot.name, demonstration.fps, qpos, object_poses, iterations, seconds)
 
 
