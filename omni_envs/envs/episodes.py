@@ -1,0 +1,133 @@
+"""The running episodes of N simulations: where each is in its motion, and how it ends."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from omni_envs.tracking.config import TrackingConfig
+from omni_envs.tracking.motion import MotionLibrary
+
+GATE_EPISODES = 100
+"""Finished episodes over which body tracking is judged."""
+
+
+class ObjectGate:
+    """Opens the object termination once the body is tracked reasonably.
+
+    OmniRetarget tests the object only "after" that. Here reasonable means: over the last
+    ``GATE_EPISODES`` finished episodes, the mean share that episodes lasted of what they could have is at
+    least ``share``. Once open it stays open.
+
+    Args:
+        share: In [0, 1]; 0 is open from the start.
+    """
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets all episodes."""
+        self._recent: deque[float] = deque(maxlen=GATE_EPISODES)
+        self.open = self._share <= 0
+
+    def record(self, lasted: np.ndarray, possible: np.ndarray) -> None:
+        """Counts finished episodes: (K,) control steps they lasted and could have lasted."""
+        if self.open:
+            return
+        self._recent.extend(lasted / possible)
+        full = len(self._recent) == GATE_EPISODES
+        self.open = full and float(np.mean(self._recent)) >= self._share
+
+
+class Episodes:
+    """One running episode per simulation.
+
+    Attributes:
+        motion: (N,) motion that is tracked.
+        frame: (N,) frame of it that is to be tracked next.
+        elapsed: (N,) control steps since the start.
+        possible: (N,) control steps from the start to the end of motion or time.
+        action: (N, n) previous action.
+        default: (N, n) default joint positions, randomization included, rad.
+        next_push: (N,) control steps until the next push.
+
+    Args:
+        library: The motions.
+        default: (n,) default joint positions, rad.
+        num: N.
+        config: The task.
+        max_steps: Control steps until the time-out, or None.
+    """
+
+    def __init__(
+        self,
+        library: MotionLibrary,
+        default: np.ndarray,
+        num: int,
+        config: TrackingConfig,
+        max_steps: int | None,
+    ) -> None:
+        self._library, self._nominal, self._config = library, default, config
+        self._max_steps = max_steps
+        joints = len(default)
+        self.motion, self.frame = np.zeros(num, int), np.zeros(num, int)
+        self.elapsed, self.possible = np.zeros(num, int), np.ones(num, int)
+        self.action, self.default = np.zeros((num, joints)), np.tile(default, (num, 1))
+        self.next_push = np.zeros(num, int)
+
+    @property
+    def table_index(self) -> np.ndarray:
+        """(N,) row of the library to track next."""
+        return self._library.starts[self.motion] + self.frame
+
+    def start(
+        self, ids: np.ndarray, motion: np.ndarray, frame: np.ndarray, rng: np.random.Generator
+    ) -> None:
+        """Starts episodes in frames of motions; the frames after them are to be tracked next.
+
+        Args:
+            ids: (K,) simulations.
+            motion: (K,) motions.
+            frame: (K,) frames that the simulations are put in.
+            rng: Source of chance.
+        """
+        self.motion[ids], self.frame[ids], self.elapsed[ids] = motion, frame + 1, 0
+        left = self._library.lengths[motion] - 1 - frame
+        self.possible[ids] = left if self._max_steps is None else np.minimum(left, self._max_steps)
+        self.action[ids] = 0.0
+        half = self._config.randomization.joint_default
+        spread = (2.0 * rng.random((len(ids), len(self._nominal))) - 1.0) * half
+        self.default[ids] = self._nominal + spread
+        self.next_push[ids] = self._interval(len(ids), rng)
+
+    def advance(self, action: np.ndarray) -> np.ndarray:
+        """Counts a control step and moves on to the next frame, the last one staying.
+
+        Returns:
+            (N,) whether the episode is over for lack of motion or time.
+        """
+        self.action = action
+        self.elapsed += 1
+        self.frame = np.minimum(self.frame + 1, self._library.lengths[self.motion] - 1)
+        return self.elapsed >= self.possible
+
+    def due_pushes(self, rng: np.random.Generator) -> np.ndarray:
+        """Counts down and returns the simulations (K,) to push now."""
+        if self._config.randomization.push is None:
+            return np.empty(0, int)
+        self.next_push -= 1
+        due = np.flatnonzero(self.next_push <= 0)
+        if len(due):
+            self.next_push[due] = self._interval(len(due), rng)
+        return due
+
+    def _interval(self, count: int, rng: np.random.Generator) -> np.ndarray | int:
+        push = self._config.randomization.push
+        if push is None:
+            return 0
+        low, high = push.interval
+        seconds = low + (high - low) * rng.random(count)
+        return np.maximum(np.round(seconds / self._config.physics.control_step), 1).astype(int)

@@ -1,0 +1,46 @@
+"""Infos of vector environments: one array per key, and a mask ``_key`` of who has it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Returns infos that every simulation has."""
+    infos: dict[str, Any] = dict(values)
+    for key, value in values.items():
+        infos[f"_{key}"] = np.ones(len(value), bool)
+    return infos
+
+
+def add_finals(
+    infos: dict[str, Any], observations: np.ndarray | dict[str, np.ndarray], done: np.ndarray
+) -> dict[str, Any]:
+    """Adds ``final_obs`` and ``final_info`` of finished simulations, as Gymnasium's SyncVectorEnv does.
+
+    Args:
+        infos: Infos of the step, still those of the finished episodes.
+        observations: (N, …) observations, still those of the finished episodes.
+        done: (N,) which simulations are finished.
+
+    Returns:
+        ``infos`` with ``final_obs``, an (N,) object array of observations and None, and ``final_info``
+        with the infos of the step masked by ``done``.
+    """
+    final_obs = np.full(len(done), None, dtype=object)
+    for i in np.flatnonzero(done):
+        final_obs[i] = (
+            {key: rows[i].copy() for key, rows in observations.items()}
+            if isinstance(observations, dict)
+            else observations[i].copy()
+        )
+    final_info = {k: done.copy() if k.startswith("_") else v.copy() for k, v in infos.items()}
+    return infos | {
+        "final_obs": final_obs,
+        "_final_obs": done.copy(),
+        "final_info": final_info,
+        "_final_info": done.copy(),
+    }

@@ -1,0 +1,58 @@
+"""Constructor options of the environments: modes and names that do not exist."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from gymnasium.vector import AutoresetMode
+
+from omni_envs.errors import InvalidOptionError, UnknownNameError
+
+
+class UnexpectedOptionError(InvalidOptionError, TypeError):
+    """A keyword that the environment does not take.
+
+    It is a ``TypeError`` too, as for any function; some libraries try keywords out and rely on that.
+
+    Args:
+        owner: The environment class.
+        name: The keyword.
+        valid: The keywords that exist.
+    """
+
+    def __init__(self, owner: str, name: str, valid: Iterable[str]) -> None:
+        valid = sorted(valid)
+        close = get_close_matches(name, valid, n=1)
+        hint = f" Did you mean {close[0]!r}?" if close else ""
+        super().__init__(
+            f"{owner}.__init__() got an unexpected keyword argument '{name}'.{hint} "
+            f"Valid: {', '.join(valid)}."
+        )
+
+
+def refuse_unknown(cls: type, unknown: Mapping[str, Any]) -> None:
+    """Raises for the first keyword that the constructor of a class did not recognise.
+
+    Raises:
+        UnexpectedOptionError: There is one.
+    """
+    parameters = inspect.signature(cls.__init__).parameters.values()  # type: ignore[misc]
+    valid = [p.name for p in parameters if p.name != "self" and p.kind is not p.VAR_KEYWORD]
+    for name in unknown:
+        raise UnexpectedOptionError(cls.__name__, name, valid)
+
+
+def autoreset_mode_of(mode: AutoresetMode | str) -> AutoresetMode:
+    """Returns the autoreset mode of a name; ``SAME_STEP`` and ``DISABLED`` are supported.
+
+    Raises:
+        UnknownNameError: Another one.
+    """
+    supported = {m.name: m for m in (AutoresetMode.SAME_STEP, AutoresetMode.DISABLED)}
+    name = mode.name if isinstance(mode, AutoresetMode) else str(mode).upper()
+    if name not in supported:
+        raise UnknownNameError("autoreset mode", name, supported)
+    return supported[name]

@@ -1,0 +1,129 @@
+"""N simulations of one model on ``mujoco.batch``: what the task reads and writes, as arrays."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from omni_envs.envs.model import EnvModel
+from omni_envs.envs.variants import ModelVariants
+from omni_envs.robots import Robot
+from omni_envs.tracking.alignment import Bodies, body_twists
+
+SPEED_LIMIT = 1e3
+"""A generalized velocity beyond this (m/s, rad/s) is a numerical explosion, not a motion."""
+
+_BAD_STATE = [
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+]
+_POSITION_AND_VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)
+_NOTHING = int(mujoco.mjtStage.mjSTAGE_NONE)
+
+
+class Simulation:
+    """N simulations of a robot in its scene.
+
+    Attributes:
+        qpos: (N, nq) live: robot 7 + n, then the object's 7.
+        qvel: (N, nv) live; angular parts of free joints in the body frame.
+        ctrl: (N, n) live joint targets, rad.
+
+    Args:
+        env_model: The model.
+        robot: The robot in it.
+        variants: Randomized models that episodes draw from.
+        num: N.
+        substeps: Physics steps per control step.
+        threads: Physics threads; 0 takes every core.
+    """
+
+    def __init__(
+        self,
+        env_model: EnvModel,
+        robot: Robot,
+        variants: ModelVariants,
+        num: int,
+        substeps: int,
+        threads: int = 0,
+    ) -> None:
+        model = env_model.model
+        self.model, self.num, self._substeps = model, num, substeps
+        self._env_model = env_model
+        self.batch = Batch(model, num, threads)
+        self.qpos, self.qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
+        self.ctrl, self._warmstart = self.batch.bind("ctrl"), self.batch.bind("qacc_warmstart")
+        self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
+        self._cvel, self._com = self.batch.bind("cvel"), self.batch.bind("subtree_com")
+        self._history = self.batch.bind("history")
+        self._root = model.body(robot.root_body).id
+        self._tracked = np.array([model.body(b).id for b in robot.tracked_bodies])
+        self._variants, self._fields = variants, variants.expand(self.batch)
+        self.variant = np.zeros(num, int)
+        self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
+        self._copy_variants(np.arange(num))
+
+    def step(self) -> np.ndarray:
+        """Advances every simulation by a control step under ``ctrl``.
+
+        Returns:
+            (N,) whether the simulation diverged. MuJoCo has then reset it to its initial state or will
+            do so: its state means nothing.
+        """
+        for kept, now in zip(self._before, (self.qpos, self.qvel, self._warmstart), strict=True):
+            np.copyto(kept, now)
+        self.batch.step(nstep=self._substeps, stage=_POSITION_AND_VELOCITY)
+        diverged = self.batch.warning[:, _BAD_STATE, 1].any(axis=1)
+        # Written so that NaN counts as diverged.
+        diverged |= ~(np.abs(self.qvel).max(axis=1) < SPEED_LIMIT)
+        return diverged
+
+    def reset(
+        self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, variant: np.ndarray
+    ) -> None:
+        """Starts simulations anew.
+
+        Args:
+            ids: (K,) sorted indices of the simulations.
+            qpos: (K, nq) start positions.
+            qvel: (K, nv) start velocities.
+            variant: (K,) indices of their randomized models.
+        """
+        self.batch.reset(ids, stage=_NOTHING)
+        self.variant[ids] = variant
+        self._copy_variants(ids)
+        self.qpos[ids], self.qvel[ids] = qpos, qvel
+        self.batch.forward(ids, stage=_POSITION_AND_VELOCITY)
+
+    def bodies(self, ids: np.ndarray | None = None) -> Bodies:
+        """Returns the tracked bodies as they are now, of all simulations or of some."""
+        if ids is None:
+            position, q, twist = (
+                np.take(a, self._tracked, axis=1) for a in (self._xpos, self._xquat, self._cvel)
+            )
+            com = self._com[:, self._root]
+        else:
+            at = (ids[:, None], self._tracked)
+            position, q, twist = self._xpos[at], self._xquat[at], self._cvel[at]
+            com = self._com[ids, self._root]
+        return Bodies(position, q, *body_twists(position, twist, com))
+
+    def contact_forces(self) -> np.ndarray:
+        """Returns the (N, sensors, samples, 3) contact forces of the last control step, N."""
+        return self._env_model.contact_forces(self._history)
+
+    def before(self, sim: int) -> dict[str, np.ndarray]:
+        """Returns the state of one simulation before its last control step, for a replay."""
+        names = ("qpos", "qvel", "qacc_warmstart")
+        state = {k: a[sim].copy() for k, a in zip(names, self._before, strict=True)}
+        return state | {"ctrl": self.ctrl[sim].copy(), "variant": np.array(self.variant[sim])}
+
+    def model_of(self, sim: int) -> mujoco.MjModel:
+        """Returns a copy of the model of one simulation, randomization included."""
+        return self.batch.get_model(sim)
+
+    def _copy_variants(self, ids: np.ndarray) -> None:
+        for name, values in self._variants.fields.items():
+            self._fields[name][ids] = values[self.variant[ids]]

@@ -1,0 +1,419 @@
+"""The vector environment: N humanoids that track references, on MuJoCo's threaded batch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from omni_envs.envs.divergence import Divergence, DivergenceLog
+from omni_envs.envs.episodes import Episodes, ObjectGate
+from omni_envs.envs.infos import add_finals, batched_infos
+from omni_envs.envs.model import build_model
+from omni_envs.envs.options import autoreset_mode_of, refuse_unknown
+from omni_envs.envs.references import ReferenceLike, common_scene, resolve_references
+from omni_envs.envs.simulation import Simulation
+from omni_envs.envs.task import TrackingTask
+from omni_envs.envs.variants import ModelVariants
+from omni_envs.errors import InvalidDataError, InvalidOptionError
+from omni_envs.robots import Robot, get_robot
+from omni_envs.tracking.config import (
+    ActionConfig,
+    ObservationConfig,
+    PhysicsConfig,
+    RandomizationConfig,
+    ResetConfig,
+    RewardConfig,
+    TerminationConfig,
+    make_config,
+)
+from omni_envs.tracking.motion import Frames, MotionLibrary
+from omni_envs.tracking.motion_sampling import MotionSampler
+from omni_envs.tracking.randomization import push, start_state
+
+Observation = np.ndarray | dict[str, np.ndarray]
+Options = Mapping[str, Any]
+
+
+class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
+    """N simulations of a robot that tracks a reference; see ``OmniEnv`` for spaces and rewards.
+
+    A control step: the action is held over the physics substeps; terminations and rewards compare the
+    new state with the reference frame that the policy saw; finished simulations restart (SAME_STEP);
+    the reference moves on by a frame; pushes; observations.
+
+    The end of a motion and the time-out are truncations. The same seed and actions give bit-identical
+    results at any number of threads.
+
+    Attributes:
+        robot: The robot.
+        config: Every number of the task.
+        references: What is tracked.
+        policy_layout: Names and slices of the policy's observation.
+        critic_layout: Names and slices of the privileged observation.
+        divergences: The latest diverged simulations, for replay.
+
+    Args:
+        num_envs: N.
+        robot: Name of the robot, or the robot.
+        task: Task whose built-in demonstration is the default reference.
+        reference: A reference file, a ``Reference``, a ``Demonstration``, or a list of these.
+        preset: ``"paper"`` or ``"beyondmimic"``.
+        anchor: See ``TrackingConfig``; as all options down to ``physics``, where None keeps the preset's.
+        reward: Dataclass or mapping.
+        termination: Dataclass or mapping.
+        observation: Dataclass or mapping.
+        randomization: Dataclass or mapping.
+        reset: Dataclass or mapping.
+        action: Dataclass or mapping.
+        physics: Dataclass, mapping, ``"default"`` or ``"fast"``.
+        num_threads: Physics threads; 0 takes every core.
+        autoreset_mode: SAME_STEP (``final_obs`` and ``final_info`` in the infos) or DISABLED (finished
+            simulations wait for ``reset(options={"reset_mask": mask})``).
+        max_episode_steps: Time-out in control steps, in place of ``termination.max_seconds``.
+        render_mode: ``"rgb_array"`` or None.
+        width: Pixels of a picture.
+        height: Pixels of a picture.
+
+    Raises:
+        OmniEnvsError: An option or reference is not valid; the message names it.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        robot: str | Robot = "g1",
+        task: str = "box_carry",
+        reference: ReferenceLike | Sequence[ReferenceLike] | None = None,
+        preset: str = "paper",
+        anchor: str | None = None,
+        reward: RewardConfig | Options | None = None,
+        termination: TerminationConfig | Options | None = None,
+        observation: ObservationConfig | Options | None = None,
+        randomization: RandomizationConfig | Options | None = None,
+        reset: ResetConfig | Options | None = None,
+        action: ActionConfig | Options | None = None,
+        physics: PhysicsConfig | Options | str | None = None,
+        num_threads: int = 0,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+        **unknown: Any,
+    ) -> None:
+        refuse_unknown(type(self), unknown)
+        if num_envs < 1:
+            raise InvalidOptionError(f"num_envs must be at least 1; got {num_envs}.")
+        self.autoreset_mode = autoreset_mode_of(autoreset_mode)
+        self.config = config = make_config(
+            preset,
+            anchor=anchor,
+            reward=reward,
+            termination=termination,
+            observation=observation,
+            randomization=randomization,
+            reset=reset,
+            action=action,
+            physics=physics,
+        )
+        self.num_envs, self.robot = num_envs, get_robot(robot)
+        dt = config.physics.control_step
+        self.metadata = {
+            "render_modes": ["rgb_array"],
+            "render_fps": round(1 / dt),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InvalidOptionError(
+                f"render_mode must be None or 'rgb_array'; got {render_mode!r}."
+            )
+        self.render_mode, self._size, self._renderer = render_mode, (width, height), None
+        self.references = resolve_references(reference, self.robot, task)
+        self._library = MotionLibrary(self.robot, self.references, 1 / dt)
+        self.scene = common_scene(self.references)
+        self._task = TrackingTask(self.robot, config, self._library.has_object)
+        env_model = build_model(self.robot, self.scene, config)
+        self._variants = ModelVariants(
+            env_model.model, self.robot, self.scene.object, config.randomization
+        )
+        self._sim = Simulation(
+            env_model, self.robot, self._variants, num_envs, config.physics.substeps, num_threads
+        )
+        if max_episode_steps is None and config.termination.max_seconds is not None:
+            max_episode_steps = max(round(config.termination.max_seconds / dt), 1)
+        default = self.robot.default_joint_array
+        self._episodes = Episodes(self._library, default, num_envs, config, max_episode_steps)
+        self._gate = ObjectGate(config.termination.object_after)
+        self.sampler = MotionSampler(self._library, config.reset)
+        self.divergences = DivergenceLog()
+        self._scale = self.robot.action_scale * config.action.scale
+        self._frames: Frames | None = None
+        self._observations: Observation | None = None
+        self.policy_layout = self._task.policy_layout
+        self.critic_layout = self._task.critic_layout
+        self._make_spaces()
+
+    def _make_spaces(self) -> None:
+        def box(size: int) -> spaces.Box:
+            return spaces.Box(-np.inf, np.inf, (size,), np.float32)
+
+        limit = self.config.action.limit
+        self.single_observation_space: spaces.Space = box(self.policy_layout.size)
+        if self.config.observation.privileged:
+            critic = box(self.critic_layout.size)
+            self.single_observation_space = spaces.Dict(
+                {"policy": self.single_observation_space, "critic": critic}
+            )
+        self.single_action_space = spaces.Box(-limit, limit, (self.robot.num_joints,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @property
+    def control_step(self) -> float:
+        """Time between two actions, s."""
+        return self.config.physics.control_step
+
+    @property
+    def object_test_active(self) -> bool:
+        """Whether losing the object ends an episode yet; see ``ObjectGate``."""
+        return self._gate.open
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: Options | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts all simulations anew, or those of a mask.
+
+        Args:
+            seed: Makes everything that follows reproducible; what adaptive sampling and the object gate
+                have learnt is forgotten.
+            options: ``reset_mask``: (N,) bool, the simulations to start; ``motion`` and ``frame``: where
+                to start, integers or one per started simulation, instead of a draw.
+
+        Returns:
+            Observations of all simulations, and infos.
+        """
+        if seed is not None:
+            value = seed if isinstance(seed, int | np.integer) else _merged(seed)
+            self._np_random, self._np_random_seed = seeding.np_random(int(value))
+            self.sampler.reset()
+            self._gate.reset()
+        options = {
+            k: v for k, v in (options or {}).items() if k in ("reset_mask", "motion", "frame")
+        }
+        mask = options.pop("reset_mask", None)
+        if mask is None:
+            ids = np.arange(self.num_envs)
+        else:
+            mask = np.asarray(mask)
+            if mask.shape != (self.num_envs,) or mask.dtype != bool:
+                raise InvalidOptionError(f"reset_mask must be ({self.num_envs},) bool.")
+            if self._observations is None and not mask.all():
+                raise InvalidOptionError("reset_mask: the first reset must start every simulation.")
+            ids = np.flatnonzero(mask)
+        self._start(ids, **options)
+        if self._observations is not None and len(ids) < self.num_envs:
+            _put(self._observations, ids, self._observe(ids))
+        else:
+            self._observations = self._observe()
+        return _copy(self._observations), self._place()
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Advances all simulations by a control step.
+
+        Args:
+            actions: (N, n); clipped to the action space. A simulation with a NaN or infinite action
+                counts as diverged.
+
+        Returns:
+            Observations, rewards, terminated, truncated, infos.
+
+        Raises:
+            InvalidDataError: The actions have another shape.
+        """
+        if self._frames is None:
+            raise InvalidOptionError("step: call reset first.")
+        episodes, frames = self._episodes, self._frames
+        action, bad = self._checked(actions)
+        offset = episodes.default
+        if self.config.action.mode == "residual":
+            joints = frames.qpos[:, 7:]
+            offset = joints + (offset - self.robot.default_joint_array)
+        np.copyto(self._sim.ctrl, offset + self._scale * action)
+        diverged = self._sim.step() | bad
+        bodies = self._sim.bodies()
+        judged = self._task.judge(
+            self._sim.qpos,
+            bodies,
+            frames,
+            action,
+            episodes.action,
+            self._sim.contact_forces(),
+            self._gate.open,
+        )
+        terminated = diverged.copy()
+        for lost in judged.tests.values():
+            terminated |= lost
+        infos = self._infos(judged, diverged)
+        reward = np.where(diverged, 0.0, judged.reward)
+        if diverged.any():
+            self._record_divergence(np.flatnonzero(diverged))
+        ended_frame = episodes.frame
+        truncated = episodes.advance(action) & ~terminated
+        done = terminated | truncated
+        finished = np.flatnonzero(done)
+        if len(finished):
+            self._gate.record(episodes.elapsed[finished], episodes.possible[finished])
+        failed = np.flatnonzero(terminated)
+        self.sampler.record(episodes.motion[failed], ended_frame[failed])
+        self._push(done)
+        self._frames = self._library.frames(episodes.table_index)
+        observations = self._observe(bodies=bodies)
+        infos |= self._place()
+        if len(finished) and self.autoreset_mode is AutoresetMode.SAME_STEP:
+            infos = add_finals(infos, observations, done)
+            self._start(finished)
+            _put(observations, finished, self._observe(finished))
+            infos |= self._place()
+        self._observations = observations
+        return _copy(observations), reward, terminated, truncated, infos
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Returns one (height, width, 3) uint8 picture per simulation, the reference as a ghost."""
+        if self.render_mode is None:
+            return None
+        return tuple(self.render_one(i) for i in range(self.num_envs))
+
+    def render_one(self, index: int = 0) -> np.ndarray:
+        """Returns a (height, width, 3) uint8 picture of one simulation, the reference as a ghost."""
+        if self._frames is None:
+            raise InvalidOptionError("render: call reset first.")
+        if self._renderer is None:
+            from omni_envs.scenes.rendering import SceneRenderer
+
+            width, height = self._size
+            self._renderer = SceneRenderer(self.robot, self.scene, width=width, height=height)
+        nq, frames = self.robot.nq, self._frames
+        qpos = self._sim.qpos[index]
+        return self._renderer.render(
+            qpos[:nq],
+            qpos[nq : nq + 7] if self._library.has_object else None,
+            ghost_qpos=frames.qpos[index],
+            ghost_object_pose=None if frames.object_pose is None else frames.object_pose[index],
+        )
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Frees the graphics context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def _checked(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        actions = np.asarray(actions, float)
+        if actions.shape != self.action_space.shape:
+            raise InvalidDataError(
+                type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"
+            )
+        limit = self.config.action.limit
+        bad = ~np.isfinite(actions).all(axis=1)
+        if bad.any():
+            actions = np.where(bad[:, None], 0.0, actions)
+        return np.clip(actions, -limit, limit), bad
+
+    def _start(
+        self,
+        ids: np.ndarray,
+        motion: int | np.ndarray | None = None,
+        frame: int | np.ndarray | None = None,
+    ) -> None:
+        """Puts simulations into start frames, drawn where not given."""
+        if not len(ids):
+            return
+        rng, count = self.np_random, len(ids)
+        motions, places = self.sampler.draw(count, rng)
+        if motion is not None:
+            motions = np.broadcast_to(np.asarray(motion, int), count)
+        if frame is not None or motion is not None:
+            places = np.broadcast_to(np.asarray(0 if frame is None else frame, int), count)
+        last = self._library.lengths[motions % self._library.num_motions] - 2
+        if (motions != motions % self._library.num_motions).any() or (
+            places != np.clip(places, 0, last)
+        ).any():
+            raise InvalidOptionError(
+                f"reset: motion must be below {self._library.num_motions} and frame between 0 and "
+                "the last but one frame of the motion."
+            )
+        start = self._library.frames(self._library.starts[motions] + places)
+        qpos, qvel = self._task.full_state(start)
+        qpos, qvel = start_state(
+            qpos,
+            qvel,
+            self.config.reset.noise,
+            self._task.soft_lower,
+            self._task.soft_upper,
+            rng,
+        )
+        self._sim.reset(ids, qpos, qvel, rng.integers(self._variants.count, size=count))
+        self._episodes.start(ids, motions, places, rng)
+        self._frames = self._library.frames(self._episodes.table_index)
+
+    def _push(self, done: np.ndarray) -> None:
+        due = self._episodes.due_pushes(self.np_random)
+        due = due[~done[due]]
+        config = self.config.randomization.push
+        if len(due) and config is not None:
+            self._sim.qvel[due, :6] += push(self._sim.qpos[due, 3:7], config, self.np_random)
+
+    def _observe(self, ids: np.ndarray | None = None, bodies: Any = None) -> Observation:
+        sim, episodes, frames = self._sim, self._episodes, self._frames
+        assert frames is not None
+        if ids is None:
+            bodies = sim.bodies() if bodies is None else bodies
+            rows = (sim.qpos, sim.qvel, bodies, frames, episodes.default, episodes.action)
+        else:
+            frames = self._library.frames(episodes.table_index[ids])
+            default, action = episodes.default[ids], episodes.action[ids]
+            rows = (sim.qpos[ids], sim.qvel[ids], sim.bodies(ids), frames, default, action)
+        return self._task.observe(*rows, self.np_random)
+
+    def _infos(self, judged: Any, diverged: np.ndarray) -> dict[str, Any]:
+        values = {f"reward/{k}": np.where(diverged, 0.0, v) for k, v in judged.terms.items()}
+        values |= {f"error/{k}": v for k, v in judged.errors.items()}
+        values |= {f"terminated/{k}": v for k, v in judged.tests.items()}
+        return batched_infos(values | {"diverged": diverged})
+
+    def _place(self) -> dict[str, Any]:
+        episodes = self._episodes
+        return batched_infos({"motion": episodes.motion.copy(), "frame": episodes.frame.copy()})
+
+    def _record_divergence(self, ids: np.ndarray) -> None:
+        for i in ids:
+            motion, frame = int(self._episodes.motion[i]), int(self._episodes.frame[i])
+            self.divergences.append(Divergence(int(i), motion, frame, **self._sim.before(int(i))))
+
+
+def _copy(observations: Observation) -> Observation:
+    if isinstance(observations, dict):
+        return {key: values.copy() for key, values in observations.items()}
+    return observations.copy()
+
+
+def _put(observations: Observation, ids: np.ndarray, rows: Observation) -> None:
+    if isinstance(observations, dict) and isinstance(rows, dict):
+        for key, values in observations.items():
+            values[ids] = rows[key]
+    elif isinstance(observations, np.ndarray):
+        observations[ids] = rows
+
+
+def _merged(seeds: Sequence[int | None]) -> int:
+    """One seed that depends on all of a list."""
+    return int(np.random.SeedSequence([s or 0 for s in seeds]).generate_state(1)[0])
