@@ -1,8 +1,7 @@
-"""The actor-critic network: normalised observations, ELU layers, one deviation per joint."""
+"""The actor-critic network as a policy of Stable-Baselines3."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,78 +10,13 @@ from gymnasium import spaces
 from omni_envs.errors import InvalidDataError, MissingDependencyError
 
 try:
-    import torch
     from stable_baselines3.common.policies import ActorCriticPolicy
     from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-    from torch import Tensor, nn
+    from torch import nn
 except ImportError as error:
     raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
 
-from omni_envs.training.normalizer import RunningNormalizer
-
-POLICY, CRITIC = "policy", "critic"
-"""Keys of a privileged observation: what the robot knows, and what only the simulator knows."""
-
-
-class Actor(nn.Module):
-    """Observation → mean action: the part of a policy that is exported.
-
-    Args:
-        normalizer: Observation normalisation.
-        hidden: Hidden layers.
-        output: Linear layer to the action.
-        low: (n,) smallest action that the environment takes.
-        high: (n,) largest action that the environment takes.
-    """
-
-    low: Tensor
-    high: Tensor
-
-    def __init__(
-        self,
-        normalizer: RunningNormalizer,
-        hidden: nn.Module,
-        output: nn.Module,
-        low: np.ndarray,
-        high: np.ndarray,
-    ) -> None:
-        super().__init__()
-        self.normalizer, self.hidden, self.output = normalizer, hidden, output
-        self.register_buffer("low", torch.as_tensor(low, dtype=torch.float32))
-        self.register_buffer("high", torch.as_tensor(high, dtype=torch.float32))
-
-    def forward(self, observation: Tensor) -> Tensor:
-        """Returns the deterministic action (N, n), clipped to what the environment takes."""
-        action = self.output(self.hidden(self.normalizer(observation)))
-        return torch.clamp(action, self.low, self.high)
-
-
-class ActorCriticNetwork(nn.Module):
-    """Separate normaliser and hidden layers for actor and critic, in the shape SB3 asks for."""
-
-    def __init__(self, actor_size: int, critic_size: int, hidden: tuple[int, ...]) -> None:
-        super().__init__()
-        self.actor_normalizer = RunningNormalizer(actor_size)
-        self.critic_normalizer = RunningNormalizer(critic_size)
-        self.actor, self.critic = _layers(actor_size, hidden), _layers(critic_size, hidden)
-        self.latent_dim_pi = self.latent_dim_vf = hidden[-1]
-
-    def forward(self, features: Tensor | Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-        """Returns the last hidden layer of actor and critic."""
-        return self.forward_actor(features), self.forward_critic(features)
-
-    def forward_actor(self, features: Tensor | Mapping[str, Tensor]) -> Tensor:
-        """Returns the last hidden layer of the actor."""
-        return self.actor(self.actor_normalizer(_pick(features, POLICY)))
-
-    def forward_critic(self, features: Tensor | Mapping[str, Tensor]) -> Tensor:
-        """Returns the last hidden layer of the critic."""
-        return self.critic(self.critic_normalizer(_pick(features, CRITIC)))
-
-    def update_normalizers(self, features: Tensor | Mapping[str, Tensor]) -> None:
-        """Feeds observations (N, ·) to both normalisers."""
-        self.actor_normalizer.update(_pick(features, POLICY))
-        self.critic_normalizer.update(_pick(features, CRITIC))
+from omni_envs.training.network import CRITIC, POLICY, Actor, ActorCriticNetwork
 
 
 class TrackingPolicy(ActorCriticPolicy):
@@ -146,18 +80,6 @@ class _Untouched(BaseFeaturesExtractor):
 
     def forward(self, observation: Any) -> Any:
         return observation
-
-
-def _layers(size: int, hidden: tuple[int, ...]) -> nn.Sequential:
-    layers: list[nn.Module] = []
-    for width in hidden:
-        layers += [nn.Linear(size, width), nn.ELU()]
-        size = width
-    return nn.Sequential(*layers)
-
-
-def _pick(features: Tensor | Mapping[str, Tensor], key: str) -> Tensor:
-    return features if isinstance(features, Tensor) else features[key]
 
 
 def _actor_and_critic_size(space: spaces.Space) -> tuple[int, int]:

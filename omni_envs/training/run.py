@@ -21,10 +21,8 @@ from omni_envs.training.config import TrainConfig
 from omni_envs.training.curve import write_history
 from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.ppo import TrackingPPO
+from omni_envs.training.rollout import BODY_ERROR
 from omni_envs.training.sb3_vec_env import SB3VecEnv
-
-BODY_ERROR = "error_body_position"
-"""Info of the environment: mean distance of the tracked bodies from the reference (N,), m."""
 
 KEEP_CHECKPOINTS = 3
 
@@ -113,7 +111,7 @@ def _train(
         state.save(config.out)
     history, before, begin = state.history, state.seconds, time.perf_counter()
     seconds, saved = before, learner.num_timesteps
-    control_dt = float(getattr(env.unwrapped, "control_dt", 1.0))
+    control_dt = float(getattr(env.unwrapped, "control_step", 1.0))
     show = sys.stderr.isatty() if progress is None else progress
     with TrainingDisplay(config.steps, config.time_limit, control_dt, show) as display:
         while learner.num_timesteps < config.steps and not 0 < config.time_limit <= seconds:

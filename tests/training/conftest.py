@@ -46,13 +46,13 @@ class Chase(VectorEnv):
         reward = np.exp(-10.0 * distance**2)
         terminated = distance > 1.0
         truncated = self.time >= HORIZON
-        infos: dict[str, Any] = {"error_body_position": distance.copy()}
+        infos: dict[str, Any] = {"error/body_position": distance.copy()}
         done = terminated | truncated
         if done.any():
             infos["final_obs"], infos["_final_obs"] = self._observe(), done
             infos["final_info"] = {
-                "error_body_position": distance.copy(),
-                "_error_body_position": done,
+                "error/body_position": distance.copy(),
+                "_error/body_position": done,
             }
             self._place(done)
         return self._observe(), reward, terminated, truncated, infos

@@ -6,6 +6,7 @@ pytest.importorskip("stable_baselines3")
 import torch
 
 from omni_envs.errors import InvalidDataError
+from omni_envs.training.network import Actor
 from omni_envs.training.policy import TrackingPolicy
 
 ACTIONS = spaces.Box(-0.5, 0.5, (3,), np.float32)
@@ -69,3 +70,11 @@ def test_actor_is_what_predict_returns_clipping_included():
 def test_other_observation_spaces_are_refused(space):
     with pytest.raises(InvalidDataError, match=r"observation_space.*'policy' and 'critic'"):
         _policy(space)
+
+
+def test_actor_is_rebuilt_from_saved_weights():
+    policy = _policy(spaces.Dict({"policy": _box(4), "critic": _box(7)}))
+    seen = {"policy": torch.randn(64, 4), "critic": torch.randn(64, 7)}
+    policy.mlp_extractor.update_normalizers(seen)
+    rebuilt = Actor.from_weights(policy.state_dict(), ACTIONS.low, ACTIONS.high)
+    assert torch.equal(rebuilt(seen["policy"]), policy.actor()(seen["policy"]))

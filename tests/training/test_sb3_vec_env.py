@@ -31,7 +31,7 @@ def test_terminal_observation_is_the_last_of_the_old_episode(chase, privileged):
             np.testing.assert_allclose(last, (before + 0.1 * actions)[i] * 5 + 3, rtol=1e-5)
             assert not np.allclose(last, now)
             assert infos[i]["TimeLimit.truncated"] is bool(i != 0)
-            assert infos[i]["error_body_position"] == pytest.approx(
+            assert infos[i]["error/body_position"] == pytest.approx(
                 np.linalg.norm((before + 0.1 * actions)[i])
             )
             seen[i] += 1

@@ -1,0 +1,1 @@
+"""Policies out: files for deploy stacks, each proved against the network it came from."""

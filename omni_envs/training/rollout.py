@@ -1,0 +1,72 @@
+"""Plays one episode per simulation with any policy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+BODY_ERROR, FRAME = "error/body_position", "frame"
+"""Infos of the environment: distance of the tracked bodies from the re-aligned reference, root mean
+square over the bodies (N,), m; frame of the motion that is tracked next (N,)."""
+
+
+class Policy(Protocol):
+    """Observations (N, ·) at reference frames (N,) → actions (N, n)."""
+
+    def __call__(self, observations: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Returns the actions."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Episodes:
+    """One episode of each of N simulations.
+
+    Attributes:
+        lengths: (N,) control steps.
+        returns: (N,) undiscounted sum of rewards.
+        terminated: (N,) whether a termination criterion was hit.
+        body_error: (N,) mean over the episode of the distance of the tracked bodies, m.
+    """
+
+    lengths: np.ndarray
+    returns: np.ndarray
+    terminated: np.ndarray
+    body_error: np.ndarray
+
+
+def play(
+    env: VectorEnv,
+    policy: Policy,
+    *,
+    seed: int | None = None,
+    options: Mapping[str, Any] | None = None,
+    max_steps: int | None = None,
+) -> Episodes:
+    """Plays until every simulation has finished its first episode.
+
+    Args:
+        env: Vector environment in SAME_STEP mode with the infos of ``OmniVectorEnv``.
+        policy: Who acts.
+        seed: Seed of the reset.
+        options: Options of the reset.
+        max_steps: Control steps after which an episode counts as survived.
+    """
+    n = env.num_envs
+    lengths, alive = np.zeros(n, int), np.ones(n, bool)
+    returns, errors, terminated = np.zeros(n), np.zeros(n), np.zeros(n, bool)
+    observations, infos = env.reset(seed=seed, options=None if options is None else dict(options))
+    while alive.any() and (max_steps is None or lengths.max() < max_steps):
+        seen = observations["policy"] if isinstance(observations, Mapping) else observations
+        actions = policy(seen, infos[FRAME])
+        observations, rewards, ended, truncated, infos = env.step(actions)
+        lengths[alive] += 1
+        returns[alive] += rewards[alive]
+        errors[alive] += infos[BODY_ERROR][alive]
+        terminated |= alive & ended
+        alive &= ~(ended | truncated)
+    return Episodes(lengths, returns, terminated, errors / lengths)
