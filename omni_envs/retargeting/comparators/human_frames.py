@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from omni_envs import rotations
-from omni_envs.demonstrations import Demonstration
+from omni_envs.demonstrations import SMPLH, Demonstration
 from omni_envs.robots import KEYPOINTS, SIDES
 
 HUMAN_BODIES = (
@@ -17,9 +17,9 @@ HUMAN_BODIES = (
     "torso",
     *(f"{s}_{b}" for s in SIDES for b in ("hip", "knee", "foot", "shoulder", "elbow", "wrist")),
 )
-"""Bodies in the order of every (T, 14, ·) array. A hip is the thigh, a shoulder the upper arm, and so on."""
+"""Bodies in the order of every (T, 14, ·) array: a hip is the thigh, a shoulder the upper arm."""
 
-# The joint itself where a skeleton has it: a keypoint may stand for something else, such as a fingertip.
+# The joint itself where a skeleton has it: a keypoint may be something else, such as a fingertip.
 _JOINTS = {
     "pelvis": ("Pelvis", "Hips"),
     "left_wrist": ("L_Wrist", "LeftHand"),
@@ -30,7 +30,7 @@ _KEYPOINTS = {
     **{f"{s}_foot": f"{s}_toe" for s in SIDES},
     **{f"{s}_wrist": f"{s}_hand" for s in SIDES},
 }
-_INTERMIMIC = {
+_SMPLH = {
     "pelvis": "Pelvis",
     "torso": "Chest",
     **{
@@ -61,8 +61,8 @@ _SPINE_FALLBACK = 0.02
 def human_frames(demonstration: Demonstration) -> tuple[np.ndarray, np.ndarray]:
     """Positions and orientations of ``HUMAN_BODIES``.
 
-    Orientations are the source's own where their convention is known (InterMimic); otherwise they are
-    estimated from the joint positions, see ``estimate_frames``.
+    Orientations are the source's own where their convention is known (InterMimic); otherwise they
+    are estimated from the joint positions, see ``estimate_frames``.
 
     Args:
         demonstration: The human motion.
@@ -72,9 +72,9 @@ def human_frames(demonstration: Demonstration) -> tuple[np.ndarray, np.ndarray]:
     """
     names = demonstration.joint_names
     positions = demonstration.positions[:, [_joint(demonstration, b) for b in HUMAN_BODIES]]
-    if demonstration.orientations is None or not set(_INTERMIMIC.values()) <= set(names):
+    if demonstration.orientations is None or names != SMPLH.joint_names:
         return positions, estimate_frames(demonstration.keypoints)
-    own = demonstration.orientations[:, [names.index(_INTERMIMIC[b]) for b in HUMAN_BODIES]]
+    own = demonstration.orientations[:, [names.index(_SMPLH[b]) for b in HUMAN_BODIES]]
     return positions, rotations.multiply(own, _INTERMIMIC_TO_SMPL)
 
 
@@ -88,15 +88,16 @@ def _joint(demonstration: Demonstration, body: str) -> int:
 def estimate_frames(keypoints: np.ndarray) -> np.ndarray:
     """Estimates body frames from joint positions.
 
-    - Pelvis: x along the line between the hips, y near the line from their middle to the pelvis keypoint.
-    - Torso: y from the pelvis to the middle of the shoulders, x near the line between the shoulders.
-    - Thigh and shin: y against the bone, x along the knee's axis, the normal of the leg's plane; a straight
-      leg takes the normal of the plane of shin and foot.
-    - Foot: the same normal of shin and foot, the sole parallel to the ankle-to-toe line pitched by the angle
-      of a flat foot.
-    - Upper arm, forearm and hand: x along the bone (against it on the right), y along the elbow's axis; a
-      straight arm takes the axis that would bend it forward. The hand continues the forearm: twist of the
-      wrist is not observable.
+    - Pelvis: x along the line between the hips, y near the line from their middle to the pelvis
+      keypoint.
+    - Torso: y from the pelvis to the middle of the shoulders, x near the line between these.
+    - Thigh and shin: y against the bone, x along the knee's axis, the normal of the leg's plane; a
+      straight leg takes the normal of the plane of shin and foot.
+    - Foot: x is the normal of the plane of shin and foot, z is the ankle-to-toe line turned up by
+      the angle it has in a flat foot.
+    - Upper arm, forearm and hand: x along the bone (against it on the right), y along the elbow's
+      axis; a straight arm takes the axis that would bend it forward. The hand continues the
+      forearm: the twist of the wrist is not observable.
 
     Args:
         keypoints: (T, 15, 3) world positions in the order of ``KEYPOINTS``.
