@@ -243,11 +243,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             raise InvalidOptionError("step: call reset first.")
         episodes, frames = self._episodes, self._frames
         action, bad = self._checked(actions)
-        offset = episodes.default
         if self.config.action.mode == "residual":
-            joints = frames.qpos[:, 7:]
-            offset = joints + (offset - self.robot.default_joint_array)
-        np.copyto(self._sim.ctrl, offset + self._scale * action)
+            # From here on the standard action of the same joint target: rewards and the observed
+            # previous action then mean the same in both modes, and for an exported policy.
+            action += (frames.qpos[:, 7:] - self.robot.default_joint_array) / self._scale
+        np.copyto(self._sim.ctrl, episodes.default + self._scale * action)
         diverged = self._sim.step() | bad
         bodies = self._sim.bodies()
         judged = self._task.judge(

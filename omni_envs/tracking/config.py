@@ -262,6 +262,8 @@ class ActionConfig:
 
     Attributes:
         mode: The offset: ``"default"`` pose, or ``"residual"``: the reference's joint positions.
+            Only what is passed to ``step`` differs: rewards and the observed previous action are about
+            the action that gives the same target from the default pose, in both modes.
         limit: Actions are clipped to ± this.
         scale: Factor on the scale of the robot.
     """
