@@ -38,11 +38,11 @@ class List:
 
     def run(self) -> None:  # noqa: D102
         from omni_envs.demonstrations import builtin_names
-        from omni_envs.registration import environment_ids
+        from omni_envs.registration import ENVIRONMENTS
         from omni_envs.robots import robot_names
 
         what = {
-            "environments": list(environment_ids()),
+            "environments": [env.id for env in ENVIRONMENTS],
             "robots": list(robot_names()),
             "demonstrations": list(builtin_names()),
         }

@@ -15,6 +15,7 @@ ORDER = (
     "rotations",
     "resampling",
     "progress",
+    "rotations",
     "robots",
     "scenes",
     "demonstrations",
