@@ -56,6 +56,7 @@ _FOOT_PITCH = 0.40
 _KNEE_FALLBACK, _ELBOW_FALLBACK = 0.2, 0.15
 # Length that the direction of the spine stands in with where pelvis and hips are one point, m.
 _SPINE_FALLBACK = 0.02
+_TINY = 1e-9
 
 
 def human_frames(demonstration: Demonstration) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +126,7 @@ def estimate_frames(keypoints: np.ndarray) -> np.ndarray:
         hinge = np.cross(thigh, shin) + _KNEE_FALLBACK * sideways
         frames[f"{side}_hip"] = _along_y(-thigh, hinge)
         frames[f"{side}_knee"] = _along_y(-shin, hinge)
-        x = _unit(sideways)
+        x = _perpendicular(sideways, foot)
         instep = np.cross(foot, x)
         sole = np.cos(_FOOT_PITCH) * foot + np.sin(_FOOT_PITCH) * instep
         frames[f"{side}_foot"] = np.stack([x, np.cross(sole, x), sole], axis=-1)
@@ -141,12 +142,17 @@ def estimate_frames(keypoints: np.ndarray) -> np.ndarray:
 
 
 def _unit(v: np.ndarray) -> np.ndarray:
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+    """Unit vectors; x for a bone without length."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.where(length > _TINY, v / np.maximum(length, _TINY), (1.0, 0.0, 0.0))
 
 
 def _perpendicular(v: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """The unit vector perpendicular to a unit axis and nearest to v."""
-    return _unit(v - np.sum(v * axis, axis=-1, keepdims=True) * axis)
+    """The unit vector perpendicular to a unit axis and nearest to v; any if v is parallel to it."""
+    across = v - np.sum(v * axis, axis=-1, keepdims=True) * axis
+    parallel = np.linalg.norm(across, axis=-1, keepdims=True) <= _TINY
+    other = np.eye(3)[np.abs(axis).argmin(axis=-1)]
+    return _unit(np.where(parallel, np.cross(axis, other), across))
 
 
 def _along_x(x: np.ndarray, near_y: np.ndarray) -> np.ndarray:
