@@ -30,8 +30,8 @@ def closest_points(parts: Iterable[Part], points: np.ndarray) -> tuple[np.ndarra
     for part in parts:
         orientation = np.asarray(part.quaternion)
         local = rotate(conjugate(orientation), points - part.position)
-        project = _on_box if isinstance(part.shape, Box) else _on_mesh
-        found, signed = project(part.shape, local)  # type: ignore[operator]
+        shape = part.shape
+        found, signed = _on_box(shape, local) if isinstance(shape, Box) else _on_mesh(shape, local)
         nearer = signed < distance
         closest[nearer] = rotate(orientation, found[nearer]) + part.position
         distance[nearer] = signed[nearer]
