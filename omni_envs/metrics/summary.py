@@ -85,8 +85,9 @@ def details(report: ReferenceReport) -> Figures:
         figures[f"stance_pivot_drift_max_{mode}_m"] = _max(report.pivot_drift[mode])
     for centimetres in (1, 2, 5):
         near = 0.01 * centimetres
-        desired, touched = _pooled(report, near)
-        figures[f"contact_fraction_{centimetres}cm"] = _ratio(touched, desired)
+        if near != TOUCHING:  # that one is in the summary
+            desired, touched = _pooled(report, near)
+            figures[f"contact_fraction_{centimetres}cm"] = _ratio(touched, desired)
         figures[f"contact_all_fraction_{centimetres}cm"] = _contact_all(report, near)
         for link, wanted in report.contact.items():
             touching = wanted & (report.contact_distance[link] <= near)

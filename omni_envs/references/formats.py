@@ -119,7 +119,12 @@ def _read_motion(path: Path, robot: Robot, arrays: Mapping[str, np.ndarray]) -> 
     qpos = _normalized(path, "joint_pos", joints[:, [*range(7), *order]])
     poses = None
     if "object_pos_w" in arrays and "object_quat_w" in arrays:
-        parts = [_floats(path, name, arrays[name]) for name in ("object_pos_w", "object_quat_w")]
+        parts = []
+        for name, width in (("object_pos_w", 3), ("object_quat_w", 4)):
+            part = _floats(path, name, arrays[name])
+            if part.shape != (len(qpos), width):
+                raise FileFormatError(path, name, f"({len(qpos)}, {width})", str(part.shape))
+            parts.append(part)
         poses = _normalized(path, "object_quat_w", np.concatenate(parts, axis=1))
     _warn_of_wrong_velocities(path, robot, fps, qpos, arrays)
     return ForeignMotion(path, "holosoma_motion", robot, fps, qpos, poses)
@@ -131,6 +136,10 @@ def _warn_of_wrong_velocities(
     stored, names = arrays.get("body_lin_vel_w"), arrays.get("body_names")
     if stored is None or names is None or len(qpos) < 3:
         return
+    if stored.shape != (len(qpos), len(names), 3):
+        raise FileFormatError(
+            path, "body_lin_vel_w", f"({len(qpos)}, {len(names)}, 3)", str(stored.shape)
+        )
     order = {str(n): i for i, n in enumerate(names)}
     bodies = [b for b in robot.tracked_bodies if b in order]
     positions, _, _, _ = body_kinematics(robot.model, qpos, generalized_velocities(qpos, fps))
@@ -141,8 +150,8 @@ def _warn_of_wrong_velocities(
     if worst > _WRONG_VELOCITY:
         warnings.warn(
             f"{path}: body velocities contradict the poses by up to {worst:.2f} m/s (root mean "
-            "square); they are ignored and made from the poses. Known cause: a root angular velocity "
-            "in the world frame where MuJoCo's free joint has it in the body frame.",
+            "square); they are ignored and made from the poses. Known cause: the root's angular "
+            "velocity in the world frame where MuJoCo's free joint has it in the body frame.",
             stacklevel=4,
         )
 
