@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from mink.tasks import BaseTask
 
+from omni_envs.retargeting.foothold_task import FootholdTask
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
@@ -85,7 +86,7 @@ class FrameSolver:
             configuration.update(configuration.step(dq))
             steps += 1
             last, predicted = predicted, before + qp.decrease(dq)
-            if abs(predicted - last) <= self.options.convergence * abs(predicted):
+            if not soft and abs(predicted - last) <= self.options.convergence * abs(predicted):
                 break
         repairs, violations, repair_soft = self._restore()
         q = configuration.data.qpos.copy()
@@ -95,7 +96,7 @@ class FrameSolver:
         """Half the weighted cost of the current configuration."""
         cost = 0.5 * self._weight * self._mesh.energy(self.configuration)
         for task in self.tasks:
-            if isinstance(task, ProximalTask):
+            if isinstance(task, ProximalTask | FootholdTask):
                 cost += task.cost(self.configuration)
         return cost
 

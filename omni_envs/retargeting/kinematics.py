@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from omni_envs.robots import KEYPOINTS, SIDES, Robot
+from omni_envs.robots import KEYPOINTS, SIDES, Foot, Robot
 from omni_envs.robots.self_collision import resting_pairs
 from omni_envs.scenes import OBJECT, Scene, build_spec
 
@@ -65,8 +65,8 @@ class Kinematics(mink.Configuration):
         )
         self._feet = Points(
             model,
-            [foot.body for foot in feet for _ in range(2)],
-            np.array([p for foot in feet for p in (foot.sole[-1], np.mean(foot.sole[:-1], axis=0))]),
+            [foot.body for foot in feet for _ in range(3)],
+            np.array([point for foot in feet for point in _foot_points(foot)]),
         )
         self._root = int(model.body(robot.root_body).id)
 
@@ -128,13 +128,22 @@ class Kinematics(mink.Configuration):
         return self.positions(self._soles).reshape(2, -1, 3)
 
     def feet(self) -> np.ndarray:
-        """(2, 2, 3) toe tip and heart (mean corner) of each sole, left foot first."""
-        return self.positions(self._feet).reshape(2, 2, 3)
+        """(2, 3, 3) toe tip, arm from there to the heart (mean corner) of the sole, arm to the left.
+
+        The arm to the left is 0.1 m long.
+        """
+        feet = self.positions(self._feet).reshape(2, 3, 3)
+        feet[:, 1:] -= feet[:, :1]
+        return feet
 
     def feet_jacobians(self, feet: np.ndarray) -> np.ndarray:
-        """(2, 2, 2, nv) horizontal Jacobians: foot; tip or heart; x or y."""
-        jacobian = self.jacobians(self._feet, feet.reshape(4, 3))[:2]
-        return np.moveaxis(jacobian, 0, 1).reshape(2, 2, 2, -1)
+        """(2, 3, 2, nv) Jacobians of what ``feet`` returns, x and y only."""
+        points = feet.copy()
+        points[:, 1:] += points[:, :1]
+        jacobian = self.jacobians(self._feet, points.reshape(6, 3))[:2]
+        jacobian = np.moveaxis(jacobian, 0, 1).reshape(2, 3, 2, -1)
+        jacobian[:, 1:] -= jacobian[:, :1]
+        return jacobian
 
     def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""
@@ -147,6 +156,15 @@ class Kinematics(mink.Configuration):
         wrench[:, 2] = ax * ny - ay * nx
         wrench[:, 3:] = normals
         return wrench @ self.data.cdof.T
+
+
+def _foot_points(foot: Foot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Toe tip, heart of the sole, and the point 0.1 m to the left of the tip; body frame, z up."""
+    sole = np.array(foot.sole)
+    tip, heart = sole[-1], sole[:-1].mean(axis=0)
+    forward = tip - heart
+    left = np.array([-forward[1], forward[0], 0.0]) / np.hypot(forward[0], forward[1])
+    return tip, heart, tip + 0.1 * left
 
 
 def _compile(

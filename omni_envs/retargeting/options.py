@@ -25,14 +25,12 @@ class StanceOptions:
         anchored: Stance set in which the whole sole stays where it was at the start of the interval. None
             anchors nothing.
         tolerance: Half width of the window of an anchored toe tip, m.
-        roll: Half width of the window of the heart of an anchored sole, m: how far it may come by rolling.
         loose: Wider stance set in which the sole may move slowly. None leaves it free.
         loose_speed: Largest speed of a sole point in the loose set, m/s.
     """
 
     anchored: StanceMode | None = "default"
     tolerance: float = 1e-4
-    roll: float = 1.5e-3
     loose: StanceMode | None = "code"
     loose_speed: float = 0.08
 

@@ -22,6 +22,7 @@ from omni_envs.errors import InvalidDataError
 from omni_envs.progress import ProgressCallback
 from omni_envs.retargeting.contact_limit import ContactLimit
 from omni_envs.retargeting.first_frame import aligned_poses
+from omni_envs.retargeting.foothold_task import FootholdTask
 from omni_envs.retargeting.frame_solver import FrameResult, FrameSolver
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
@@ -34,7 +35,9 @@ from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.retargeting.stance_limit import StanceLimit
 from omni_envs.retargeting.stance_plan import (
+    FootWishes,
     StancePlan,
+    foot_wishes,
     plan_stance,
     stance_tiers,
 )
@@ -114,6 +117,13 @@ def keypoint_positions(robot: Robot, source: SourceMotion, qpos: np.ndarray) -> 
     return keypoints
 
 
+def _interpolate(at: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Linear interpolation of (len(known), …) values."""
+    flat = values.reshape(len(known), -1)
+    columns = [np.interp(at, known, column) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(len(at), *values.shape[1:])
+
+
 def _check(source: SourceMotion) -> None:
     owner = f"SourceMotion {source.name!r}"
     if source.num_frames < 1:
@@ -169,8 +179,10 @@ class _Retargeter:
         iterations = np.empty(frames, int)
         violations = np.empty((frames, len(RELAXATIONS)))
         plan, previous = self._sketch()
-        stance = StanceLimit(plan)
+        stance = StanceLimit(plan, self.options.stance.tolerance)
         self.limits.append(stance)
+        foothold = FootholdTask(plan)
+        self.solver.tasks.append(foothold)
         self.plan = plan
         for t in range(frames):
             start = perf_counter()
@@ -178,6 +190,7 @@ class _Retargeter:
             self.smoothness.set_target(previous)
             if t > 0 and self.velocity is not None:
                 self.velocity.set_previous(previous)
+            foothold.set_frame(t)
             stance.hold(t)
             result = self.solver.solve(previous, self.options.iterations, self.options.trust_region)
             stance.record(self.configuration, t)
@@ -236,7 +249,7 @@ class _Retargeter:
         every = np.unique(
             np.append(np.arange(0, source.num_frames, _STRIDE), source.num_frames - 1)
         )
-        feet = np.empty((len(every), 2, 2, 2))
+        feet = np.empty((len(every), 2, 3, 2))
         for i, t in enumerate(every):
             self._place(t)
             if i == 0:
@@ -248,12 +261,15 @@ class _Retargeter:
                     q, self.options.iterations, _STRIDE * self.options.trust_region
                 ).q
             feet[i] = self.configuration.feet()[:, :, :2]
+        wishes = foot_wishes(feet)
         # Between these frames the feet follow the human's toes: the offset changes slowly.
         human = source.keypoints[:, [KEYPOINTS.index(f"{side}_toe") for side in SIDES], :2]
-        offset = feet - human[every, :, None]
-        wishes = np.repeat(human[:, :, None], 2, axis=2)
         frames = np.arange(source.num_frames)
-        for index in np.ndindex(offset.shape[1:]):
-            wishes[(..., *index)] += np.interp(frames, every, offset[(..., *index)])
+        wishes = FootWishes(
+            human + _interpolate(frames, every, wishes.tips - human[every]),
+            _interpolate(frames, every, wishes.headings),
+            _interpolate(frames, every, wishes.reach),
+            _interpolate(frames, every, wishes.lying),
+        )
         tier = stance_tiers(source, self.options.stance)
         return plan_stance(tier, wishes, source.fps, self.options.stance), first

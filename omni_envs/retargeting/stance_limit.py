@@ -6,58 +6,55 @@ import numpy as np
 
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import STANCE, RowLimit, Rows
-from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE, TIP, StancePlan
+from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE, StancePlan
+
+TIP, LEFT = 0, 2
+"""Rows of ``Kinematics.feet``: the toe tip, and the arm from there to the left."""
 
 
 class StanceLimit(RowLimit):
-    """Windows of toe tip and heart of both soles on the current frame of a plan.
+    """Windows of both feet on the current frame of a plan.
 
-    An anchored foot keeps its **absolute** place: a window about the previous frame, as in the official
-    code, lets the foot creep. It may roll over its toes, which is not slip, where the plan does;
-    non-penetration holds the rest of the sole above the ground.
+    An anchored foot keeps its **absolute** place and heading: a window about the previous frame, as in the
+    official code, lets the foot creep. It may roll over its toes, which is not slip, and turn on them where
+    the human does; non-penetration holds the rest of the sole above the ground.
 
     Args:
         plan: Where the feet should be.
+        tolerance: Half width of the window of the heading, as way of a point 0.1 m from the tip, m.
     """
 
-    def __init__(self, plan: StancePlan) -> None:
+    def __init__(self, plan: StancePlan, tolerance: float) -> None:
         self._plan = plan
-        self._anchors = np.zeros((2, 2, 2))
-        self.release()
-
-    def release(self) -> None:
-        """Frees both feet."""
-        self._held = np.zeros((2, 2, 2), bool)
+        self._tolerance = tolerance
+        self._tips, self._forward = np.zeros((2, 2)), np.zeros((2, 2))
 
     def hold(self, t: int) -> None:
         """Chooses frame t of the plan. ``record`` must have been called on frame t - 1."""
         plan, stays = self._plan, self._stays(t)
-        axes, slack = plan.axes[t], plan.slack[t]
-        anchors = (axes @ self._anchors[..., None])[..., 0]
-        footholds = (axes @ plan.footholds[t][..., None])[..., 0]
-        centre = np.where(stays[:, None, None], anchors, footholds)
-        lower, upper = centre - slack, centre + slack
-        held = np.isfinite(slack)
-        held[:, TIP] |= (plan.tier[t] == LOOSE)[:, None]
+        slack = plan.tip_slack[t][:, None]
+        centre = np.where(stays[:, None], self._tips, plan.tips[t])
+        low, high = centre - slack, centre + slack
         if t > 0:
             # Nowhere further than a step from the frame before, even if that misses the foothold.
-            step = np.where(stays[:, None], np.inf, plan.step[t])[:, :, None]
-            np.clip(lower, anchors - step, anchors + step, out=lower)
-            np.clip(upper, anchors - step, anchors + step, out=upper)
-        self._held = held & np.isfinite(lower)
-        self._axes = axes[self._held]
-        self._lower, self._upper = lower[self._held], upper[self._held]
+            step = np.where(stays, np.inf, plan.tip_step[t])[:, None]
+            np.clip(low, self._tips - step, self._tips + step, out=low)
+            np.clip(high, self._tips - step, self._tips + step, out=high)
+        held = np.isfinite(plan.tip_slack[t]) | (plan.tier[t] == LOOSE)
+        self._held = np.flatnonzero(held & np.isfinite(low[:, 0]))
+        self._low, self._high = low[self._held], high[self._held]
+        self._staying = np.flatnonzero(stays & ~plan.pivots[t])
 
     def record(self, configuration: Kinematics, t: int) -> None:
         """Remembers where frame t has put the feet, except those that it held in their place."""
-        plan, stays = self._plan, self._stays(t)
-        places = configuration.feet()[:, :, :2]
-        # Where the foot has reached the planned place it keeps that, so that its window does not wander.
-        missed = (plan.axes[t] @ (places - plan.footholds[t])[..., None])[..., 0]
-        reached = (np.abs(missed) <= plan.slack[t] + 1e-4).all(axis=2)
-        reached &= (plan.tier[t] == ANCHORED)[:, None]
-        anchors = np.where(reached[..., None], plan.footholds[t], places)
-        self._anchors[~stays] = anchors[~stays]
+        plan, feet = self._plan, configuration.feet()[:, :, :2]
+        # A tip that has reached its foothold keeps that, so that its window does not wander.
+        missed = np.abs(feet[:, TIP] - plan.tips[t]).max(axis=1)
+        reached = (plan.tier[t] == ANCHORED) & (missed <= plan.tip_slack[t] + 1e-4)
+        moved = ~self._stays(t)
+        self._tips[moved] = np.where(reached[:, None], plan.tips[t], feet[:, TIP])[moved]
+        self._forward[moved] = feet[moved, LEFT, ::-1] * [1.0, -1.0]
+        self._forward /= np.linalg.norm(self._forward, axis=1, keepdims=True)
 
     def _stays(self, t: int) -> np.ndarray:
         """(2,) whether each foot keeps the place of the frame before."""
@@ -65,13 +62,21 @@ class StanceLimit(RowLimit):
         return (tier[t] == ANCHORED) & (tier[t - 1] == ANCHORED) if t > 0 else np.zeros(2, bool)
 
     def rows(self, configuration: Kinematics) -> Rows | None:
-        """Returns a row for every held axis of a point."""
-        if not self._held.any():
+        """Returns two rows for a held toe tip and one for a held heading."""
+        if not (len(self._held) or len(self._staying)):
             return None
         feet = configuration.feet()
-        points = np.nonzero(self._held)[:2]
-        jacobian = configuration.feet_jacobians(feet)[points]
-        A = (self._axes[:, :, None] * jacobian).sum(axis=1)
-        place = (self._axes * feet[:, :, :2][points]).sum(axis=1)
-        kind = np.full(len(place), STANCE)
-        return Rows(A, self._lower - place, self._upper - place, kind)
+        jacobian = configuration.feet_jacobians(feet)
+        # The arm to the left keeps no component along the heading.
+        forward = self._forward[self._staying]
+        turned = (feet[self._staying, LEFT, :2] * forward).sum(axis=1)
+        tips = feet[self._held, TIP, :2]
+        A = np.concatenate(
+            [
+                jacobian[self._held, TIP].reshape(-1, jacobian.shape[-1]),
+                (jacobian[self._staying, LEFT] * forward[:, :, None]).sum(axis=1),
+            ]
+        )
+        lower = np.concatenate([(self._low - tips).ravel(), -self._tolerance - turned])
+        upper = np.concatenate([(self._high - tips).ravel(), self._tolerance - turned])
+        return Rows(A, lower, upper, np.full(len(lower), STANCE))

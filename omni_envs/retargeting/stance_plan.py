@@ -4,8 +4,8 @@ Anchoring a foot where it happens to be when a stance begins puts it in the wron
 still settles. A foothold in the middle of where the foot would like to be over the whole interval costs a
 tenth of the deformation energy. So a coarse pass without stance finds the wishes, and the plan keeps
 
-* the toe tip of an *anchored* foot in one place, and the heart of its sole beside it: the foot may roll over
-  its toes, but not slide or turn; where the wish hardly rolls, neither does the plan;
+* the toe tip of an *anchored* foot in one place: with its heading, which ``StanceLimit`` keeps as well, it
+  may roll over its toes, but not slide or turn;
 * the toe tip of a *loose* foot below a speed;
 * consecutive footholds within reach of each other.
 """
@@ -23,36 +23,66 @@ from omni_envs.retargeting.options import StanceOptions
 FREE, LOOSE, ANCHORED = 0, 1, 2
 """Tiers of a foot in a frame."""
 
-TIP, HEART = 0, 1
-"""Held points of a foot."""
-
-_DETOUR = 0.6  # m/s by which a free foot may be asked to leave its way for the next foothold
+# Speeds by which a free foot may be asked to leave its way for the next foothold.
+_DETOUR = 0.6  # m/s
 _FUNNEL = 0.15  # m: no window wider than this
 _FLAT = 3e-3  # m: a stance whose arm from tip to heart changes less, seen from above, does not roll
-_UPRIGHT = 0.03  # m: a foot with a shorter arm stands on its toes and has no heading
+# A heading is planned where the wish hardly turns (rad) and the foot lies (horizontal part of its left axis).
+_STEADY, _LYING = 0.5, 0.9
+# Pull of the planned heading on a landing foot: frames before landing that feel it, and its weight.
+_APPROACH, _PULL = 8, 50.0
+
+
+@dataclass(frozen=True, eq=False)
+class FootWishes:
+    """Where the feet would be without stance.
+
+    Attributes:
+        tips: (T, 2, 2) horizontal place of the toe tips, m.
+        headings: (T, 2) heading, rad, continuous.
+        reach: (T, 2) horizontal distance from tip to heart of the sole along the heading, m; negative.
+        lying: (T, 2) length of the horizontal part of the unit axis to the left.
+    """
+
+    tips: np.ndarray
+    headings: np.ndarray
+    reach: np.ndarray
+    lying: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class StancePlan:
-    """Where toe tip and heart of both feet should be.
-
-    Windows of the heart are along and across the foot, those of the tip along x and y.
+    """Windows of the feet on every frame; of the current or, before it, the next interval.
 
     Attributes:
         tier: (T, 2) ``FREE``, ``LOOSE`` or ``ANCHORED``.
-        footholds: (T, 2, 2, 2) horizontal place of tip and heart of each foot in the current or the next
-            interval, m.
-        axes: (T, 2, 2, 2, 2) axes of the windows: foot; tip or heart; axis; x and y of the axis.
-        slack: (T, 2, 2, 2) half width of the windows, m, infinite for none: the tolerance on the foothold,
-            and before it what the foot can still go.
-        step: (T, 2, 2) largest step of each point since the previous frame, m, per axis.
+        pivots: (T, 2) the foot turns on its toes: its heading is free.
+        tips: (T, 2, 2) horizontal place of the toe tip, m.
+        tip_slack: (T, 2) half width of its window, infinite for none: the tolerance on the foothold, and
+            before it what the foot can still go, m.
+        tip_step: (T, 2) largest step of the toe tip since the previous frame, m, per axis.
+        forward: (T, 2, 2) unit vector of the wished heading.
+        arms: (T, 2, 2) wished components along ``forward`` of the arms to the heart and to the left, m.
+        arm_weights: (T, 2, 2) weights of these wishes, 1/m².
     """
 
     tier: np.ndarray
-    footholds: np.ndarray
-    axes: np.ndarray
-    slack: np.ndarray
-    step: np.ndarray
+    pivots: np.ndarray
+    tips: np.ndarray
+    tip_slack: np.ndarray
+    tip_step: np.ndarray
+    forward: np.ndarray
+    arms: np.ndarray
+    arm_weights: np.ndarray
+
+
+def foot_wishes(feet: np.ndarray) -> FootWishes:
+    """Wishes of (T, 2, 3, 2) feet, as ``Kinematics.feet`` returns them, x and y only."""
+    left = feet[:, :, 2]
+    headings = np.unwrap(np.arctan2(-left[..., 0], left[..., 1]), axis=0)
+    forward = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    reach = (feet[:, :, 1] * forward).sum(axis=2)
+    return FootWishes(feet[:, :, 0], headings, reach, 10.0 * np.linalg.norm(left, axis=-1))
 
 
 def stance_tiers(source: SourceMotion, options: StanceOptions) -> np.ndarray:
@@ -67,43 +97,50 @@ def stance_tiers(source: SourceMotion, options: StanceOptions) -> np.ndarray:
 
 
 def plan_stance(
-    tier: np.ndarray, wishes: np.ndarray, fps: float, options: StanceOptions
+    tier: np.ndarray, wishes: FootWishes, fps: float, options: StanceOptions
 ) -> StancePlan:
     """Chooses footholds near the wishes and the windows that lead to them.
 
     Args:
         tier: (T, 2) tier of each foot on each frame.
-        wishes: (T, 2, 2, 2) horizontal places of tip and heart of each foot without stance, m.
+        wishes: Where the feet would be without stance.
         fps: Frames per second.
         options: Settings.
     """
-    footholds, slack = wishes.copy(), np.full(wishes.shape, np.inf)
-    axes = np.broadcast_to(np.eye(2), (*wishes.shape, 2)).copy()
     slow = options.loose_speed / fps / np.sqrt(2.0)  # half side of the square inside the circle
     both_slow = np.zeros(tier.shape, bool)
     both_slow[1:] = (tier[1:] >= LOOSE) & (tier[:-1] >= LOOSE)
-    step = np.abs(np.diff(wishes, axis=0, prepend=wishes[:1])).max(axis=3) + _DETOUR / fps
-    step[:, :, TIP][both_slow] = slow
-    detour = np.full(len(tier), _DETOUR / fps)
+    pace = np.abs(np.diff(wishes.tips, axis=0, prepend=wishes.tips[:1])).max(axis=2)
+    tip_step = np.where(both_slow, slow, pace + _DETOUR / fps)
+    detour = np.where(both_slow, slow, _DETOUR / fps)
+    tips, headings = wishes.tips.copy(), wishes.headings.copy()
+    tip_slack = np.full(tier.shape, np.inf)
+    arms, arm_weights = np.zeros((*tier.shape, 2)), np.zeros((*tier.shape, 2))
+    pivots = np.zeros(tier.shape, bool)
     for foot in range(2):
         runs = _runs(tier[:, foot] == ANCHORED)
         if not runs:
             continue
         for axis in range(2):
-            footholds[:, foot, TIP, axis] = _footholds(
-                runs, wishes[:, foot, TIP, axis], step[:, foot, TIP]
-            )
-        arm = wishes[:, foot, HEART] - wishes[:, foot, TIP]
-        planned, length, change = _typical_arm(runs, arm)
-        footholds[:, foot, HEART] = footholds[:, foot, TIP] + planned
-        along = planned / np.maximum(length, 1e-9)[:, None]
-        axes[:, foot, HEART] = np.stack([along, along[:, ::-1] * [-1.0, 1.0]], axis=1)
-        to_tip = np.where(both_slow[:, foot], slow, detour)
-        slack[:, foot, TIP] = _funnel(runs, to_tip, options.tolerance)[:, None]
-        slack[:, foot, HEART] = _funnel(runs, detour, options.roll)[:, None]
-        slack[change > _FLAT, foot, HEART, 0] = np.inf
-        slack[length < _UPRIGHT, foot, HEART] = np.inf
-    return StancePlan(tier, footholds, axes, slack, step)
+            wish = [wishes.tips[start:end, foot, axis].mean() for start, end in runs]
+            holds = _footholds(runs, np.array(wish), tip_step[:, foot])
+            tips[:, foot, axis] = _look_ahead(runs, holds, len(tier))
+        tip_slack[:, foot] = _funnel(runs, detour[:, foot], options.tolerance)
+        for start, end in runs:
+            wish, reach = wishes.headings[start:end, foot], wishes.reach[start:end, foot]
+            if wishes.lying[start:end, foot].min() < _LYING:
+                continue
+            if np.ptp(wish) > _STEADY:
+                pivots[start:end, foot] = True
+                continue
+            first = max(start - _APPROACH, 0)
+            headings[first:end, foot] = wish.mean()
+            arm_weights[first:end, foot, 1] = _PULL
+            if np.ptp(reach) <= _FLAT:
+                arms[first:end, foot, 0] = np.median(reach)
+                arm_weights[first + _APPROACH // 2 : end, foot, 0] = _PULL
+    forward = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    return StancePlan(tier, pivots, tips, tip_slack, tip_step, forward, arms, arm_weights)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
@@ -113,48 +150,30 @@ def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _footholds(runs: list[tuple[int, int]], wish: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """(T,) the foothold of the current or the next interval, for one coordinate.
+    """(runs,) foothold of every interval, for one coordinate.
 
-    minimise Σ_i n_i (F_i - mean of the wishes)² subject to |F_{i+1} - F_i| ≤ the steps between them.
+    minimise Σ_i n_i (F_i - wish_i)² subject to |F_{i+1} - F_i| ≤ the steps between them.
 
     Args:
         runs: Intervals of constant coordinate.
-        wish: (T,) wished coordinate.
+        wish: (runs,) wished coordinate.
         step: (T,) largest change from the frame before.
     """
-    count = np.array([end - start for start, end in runs], float)
-    holds = np.array([wish[start:end].mean() for start, end in runs])
     gaps = zip(runs[:-1], runs[1:], strict=True)
     reach = np.array([step[before[1] : after[0] + 1].sum() for before, after in gaps])
-    if (np.abs(np.diff(holds)) > reach).any():
-        eye = np.eye(len(runs))
-        sense = np.zeros(len(reach), np.intc)
-        holds, _, _, _ = daqp.solve(
-            np.diag(count), -count * holds, eye[1:] - eye[:-1], reach, -reach, sense
-        )
-    return _look_ahead(runs, holds, len(wish))
-
-
-def _typical_arm(
-    runs: list[tuple[int, int]], arm: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """From tip to heart in the current or the next interval.
-
-    Returns:
-        (T, 2) arm of mean direction and median length, (T,) its length, (T,) range of lengths.
-    """
-    length = np.linalg.norm(arm, axis=1)
-    mean = np.array([arm[start:end].mean(axis=0) for start, end in runs])
-    median = np.array([np.median(length[start:end]) for start, end in runs])
-    change = np.array([np.ptp(length[start:end]) for start, end in runs])
-    direction = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-9)
-    parts = (direction * median[:, None], median, change)
-    planned, size, spread = (_look_ahead(runs, part, len(arm)) for part in parts)
-    return planned, size, spread
+    if (np.abs(np.diff(wish)) <= reach).all():
+        return wish
+    count = np.array([end - start for start, end in runs], float)
+    eye = np.eye(len(runs))
+    sense = np.zeros(len(reach), np.intc)
+    holds, _, _, _ = daqp.solve(
+        np.diag(count), -count * wish, eye[1:] - eye[:-1], reach, -reach, sense
+    )
+    return holds
 
 
 def _look_ahead(runs: list[tuple[int, int]], values: np.ndarray, frames: int) -> np.ndarray:
-    """(T, …) the value of the current or the next run; after the last run, its own."""
+    """(T,) the value of the current or the next run; after the last run, its own."""
     following = np.searchsorted([end for _, end in runs], np.arange(frames), side="right")
     return values[np.minimum(following, len(runs) - 1)]
 
