@@ -2,12 +2,15 @@
 
 from omni_envs.viewer.pictures import picture_strip, write_picture, write_video
 from omni_envs.viewer.reference import reference_frames, reference_strip, reference_video
+from omni_envs.viewer.rollout import Rollout, watch
 
 __all__ = [
+    "Rollout",
     "picture_strip",
     "reference_frames",
     "reference_strip",
     "reference_video",
+    "watch",
     "write_picture",
     "write_video",
 ]
