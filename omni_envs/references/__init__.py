@@ -1,6 +1,18 @@
 """Robot motion out: references, their files and their cache."""
 
+from omni_envs.references.build import evaluate_reference, make_reference
+from omni_envs.references.cache import cache_folder, cached_reference
+from omni_envs.references.formats import ForeignMotion, load_motion
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.reference import Reference
 
-__all__ = ["Reference", "reference_from_qpos"]
+__all__ = [
+    "ForeignMotion",
+    "Reference",
+    "cache_folder",
+    "cached_reference",
+    "evaluate_reference",
+    "load_motion",
+    "make_reference",
+    "reference_from_qpos",
+]
