@@ -33,13 +33,13 @@ class _Motor:
         )
 
 
-# Armature of a two-stage planetary drive: J = r0 (g1 g2)² + r1 g2² + r2, with the rotor inertias r and
-# gear ratios g that Unitree publishes; efforts and speeds are those of the motors.
+# Armature of a two-stage planetary drive: J = r0 (g1 g2)² + r1 g2² + r2, with rotor inertias r and
+# gear ratios g of the motor; the values are those of mjlab's Unitree G1.
 _7520_14 = _Motor(armature=0.010177520, effort=88.0, speed=32.0)
 _7520_22 = _Motor(armature=0.025101925, effort=139.0, speed=20.0)
 _5020 = _Motor(armature=0.003609725, effort=25.0, speed=37.0)
 _4010 = _Motor(armature=0.00425, effort=5.0, speed=22.0)
-# Ankles and the upper waist are four-bar linkages of two 5020 motors; their sum is the usual approximation.
+# Two 5020 motors drive each ankle, and the upper waist, through four-bar linkages: taken as a sum.
 _2X5020 = _Motor(armature=0.00721945, effort=50.0, speed=37.0)
 
 _LEG = {
@@ -142,8 +142,7 @@ G1 = Robot(
         *(f"{s}_ankle_roll_link" for s in SIDES),
         *(f"{s}_wrist_yaw_link" for s in SIDES),
     ),
-    # Narrower than the mechanics allow, so that a reference looks upright and its wrists stay straight
-    # (OmniRetarget's limits for the G1).
+    # OmniRetarget's, narrower than the mechanics: the torso stays upright and the wrists straight.
     reference_ranges={
         "waist_roll_joint": (-0.3, 0.3),
         "waist_pitch_joint": (-0.1, 0.52),

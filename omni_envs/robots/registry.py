@@ -15,7 +15,10 @@ def robot_names() -> tuple[str, ...]:
 
 
 def get_robot(name: str | Robot) -> Robot:
-    """Looks a robot up by name; a ``Robot`` is returned as it is.
+    """Looks a robot up.
+
+    Args:
+        name: A registered name, in any case; a ``Robot`` is returned as it is.
 
     Raises:
         UnknownNameError: No robot of that name is registered.
@@ -31,9 +34,17 @@ def get_robot(name: str | Robot) -> Robot:
 def register_robot(robot: Robot) -> Robot:
     """Adds a robot to the table, so that its name works everywhere.
 
+    Args:
+        robot: The robot; its name is lower-case. Adding the same object again does nothing.
+
+    Returns:
+        The robot, for ``MINE = register_robot(Robot(...))``.
+
     Raises:
-        InvalidDataError: Another robot has that name.
+        InvalidDataError: The name is not lower-case, or another robot has it.
     """
+    if robot.name != robot.name.lower() or not robot.name:
+        raise InvalidDataError("Robot registry", "name", "lower-case", repr(robot.name))
     if _ROBOTS.get(robot.name, robot) is not robot:
         raise InvalidDataError("Robot registry", "name", "unused", f"{robot.name!r} twice")
     _ROBOTS[robot.name] = robot

@@ -10,7 +10,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from omni_envs.errors import InvalidDataError
+from omni_envs.errors import FileFormatError, InvalidDataError
 
 KEYPOINTS = (
     "pelvis",
@@ -19,7 +19,7 @@ KEYPOINTS = (
     "left_shoulder", "left_elbow", "left_hand",
     "right_shoulder", "right_elbow", "right_hand",
 )  # fmt: skip
-"""Semantic names of the 15 keypoints that human and robot share, in the order of every (…, 15, 3) array."""
+"""The 15 keypoints that human and robot share, in the order of every (…, 15, 3) array."""
 
 CONTACT_LINKS = (
     "left_hand", "right_hand",
@@ -59,6 +59,16 @@ class Actuator:
     velocity_limit: float
     armature: float
 
+    def __post_init__(self) -> None:
+        for what in ("stiffness", "effort", "velocity_limit"):
+            value = getattr(self, what)
+            if not 0.0 < value < np.inf:
+                raise InvalidDataError(f"Actuator {self.joint!r}", what, "positive", repr(value))
+        for what in ("damping", "armature"):
+            value = getattr(self, what)
+            if not 0.0 <= value < np.inf:
+                raise InvalidDataError(f"Actuator {self.joint!r}", what, "0 or more", repr(value))
+
     @property
     def action_scale(self) -> float:
         """Radians of target offset per unit of action: 0.25 · effort / kp."""
@@ -77,12 +87,19 @@ class Foot:
     body: str
     sole: tuple[tuple[float, float, float], ...]
 
+    def __post_init__(self) -> None:
+        if len(self.sole) < 4 or any(len(p) != 3 for p in self.sole):
+            raise InvalidDataError(
+                f"Foot {self.body!r}", "sole", "at least 3 corners and the toe tip", repr(self.sole)
+            )
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A humanoid robot.
 
-    Joint arrays are in MuJoCo model order: free joint first (position, quaternion wxyz), then hinges.
+    Joint arrays are in MuJoCo model order: free joint first (position, quaternion wxyz), then
+    hinges.
 
     Attributes:
         name: Short lower-case name, e.g. ``"g1"``.
@@ -131,16 +148,41 @@ class Robot:
         ):
             missing = [n for n in names if n not in table]
             if missing:
-                raise InvalidDataError(
-                    f"Robot {self.name!r}",
-                    what,
-                    f"a table with {', '.join(names)}",
-                    f"no {missing}",
-                )
+                raise self._invalid(what, f"a table with {', '.join(names)}", f"no {missing}")
+        joints = self.joint_names
+        repeated = sorted({j for j in joints if joints.count(j) > 1})
+        if repeated:
+            raise self._invalid("actuators", "one per hinge", f"several for {repeated}")
+        for what, values in (
+            ("default_joint_positions", self.default_joint_positions),
+            ("reference_ranges", self.reference_ranges),
+            ("posture_weights", self.posture_weights),
+        ):
+            unknown = [j for j in values if j not in joints]
+            if unknown:
+                raise self._invalid(what, "a table over the actuated joints", f"unknown {unknown}")
+        for name, (low, high) in self.reference_ranges.items():
+            if not low < high:
+                raise self._invalid("reference_ranges", "low < high", f"{name}: ({low}, {high})")
+
+    def _invalid(self, field: str, expected: str, found: str) -> InvalidDataError:
+        return InvalidDataError(f"Robot {self.name!r}", field, expected, found)
 
     def spec(self) -> mujoco.MjSpec:
-        """Returns a fresh, editable specification of the robot alone, actuators and armature included."""
-        spec = mujoco.MjSpec.from_file(str(self.mjcf))
+        """Returns a fresh, editable specification of the robot alone, with actuators and armature.
+
+        Raises:
+            FileFormatError: The MJCF is missing or MuJoCo cannot read it.
+            InvalidDataError: The MJCF's joints are not one free joint and then the hinges of
+                ``actuators`` in that order, or it lacks a body that this description names.
+        """
+        if not self.mjcf.is_file():
+            raise FileFormatError(self.mjcf, "file", "an existing MJCF file", "nothing")
+        try:
+            spec = mujoco.MjSpec.from_file(str(self.mjcf))
+        except ValueError as error:
+            raise FileFormatError(self.mjcf, "MJCF", "what MuJoCo reads", str(error)) from error
+        self._check(spec)
         for a in self.actuators:
             spec.joint(a.joint).armature = a.armature
             actuator = spec.add_actuator(name=a.joint, target=a.joint)
@@ -152,6 +194,24 @@ class Robot:
             actuator.forcelimited = True
             actuator.forcerange = -a.effort, a.effort
         return spec
+
+    def _check(self, spec: mujoco.MjSpec) -> None:
+        """Holds the description against the file: joints in order, every named body there."""
+        named = {self.root_body, self.anchor_body, self.torso_body}
+        named.update(self.tracked_bodies, self.end_effectors, *self.contact_links.values())
+        named.update(p.body for p in (*self.keypoints.values(), *self.feet.values()))
+        missing = sorted(named - {b.name for b in spec.bodies})
+        if missing:
+            raise self._invalid("bodies", f"bodies of {self.mjcf.name}", f"unknown {missing}")
+        free, hinge = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_HINGE)
+        types = [int(j.type) for j in spec.joints]
+        names = tuple(j.name for j in spec.joints[1:])
+        if types != [free] + [hinge] * self.num_joints or names != self.joint_names:
+            expected = f"the hinges of {self.mjcf.name} after its free joint, {names}"
+            raise self._invalid("actuators", expected, f"{self.joint_names}")
+        root = spec.joints[0].parent.name
+        if root != self.root_body:
+            raise self._invalid("root_body", f"{root!r}, which is free", repr(self.root_body))
 
     @cached_property
     def model(self) -> mujoco.MjModel:
@@ -201,7 +261,7 @@ class Robot:
 
     @cached_property
     def reference_joint_ranges(self) -> np.ndarray:
-        """(n, 2) joint ranges that a reference keeps: the mechanical ones cut by ``reference_ranges``."""
+        """(n, 2) joint ranges of references, rad: ``joint_ranges`` cut by ``reference_ranges``."""
         ranges = self.joint_ranges.copy()
         for name, (low, high) in self.reference_ranges.items():
             i = self.joint_names.index(name)

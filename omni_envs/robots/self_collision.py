@@ -17,8 +17,8 @@ REST_CLEARANCE = 0.005
 def resting_pairs(robot: Robot) -> frozenset[tuple[str, str]]:
     """Returns the pairs of bodies that are closer than ``REST_CLEARANCE`` at rest.
 
-    Rest is the default pose and the zero pose. Neither the retargeter nor the metrics count these pairs as
-    self-collision. Parent and child bodies never collide in MuJoCo and need no entry.
+    Rest is the default pose and the zero pose. Neither the retargeter nor the metrics count these
+    pairs as self-collision. Parent and child bodies never collide in MuJoCo and need no entry.
 
     Args:
         robot: The robot.
