@@ -11,8 +11,8 @@ import numpy as np
 def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Returns infos that every simulation has."""
     infos: dict[str, Any] = dict(values)
-    for key, value in values.items():
-        infos[f"_{key}"] = np.ones(len(value), bool)
+    everyone = np.ones(len(next(iter(values.values()))), bool)
+    infos.update((f"_{key}", everyone) for key in values)
     return infos
 
 

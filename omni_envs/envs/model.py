@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -36,11 +37,22 @@ class EnvModel:
     def contact_forces(self, history: np.ndarray) -> np.ndarray:
         """Returns the (N, sensors, samples, 3) forces in the (N, nhistory) sensor history, N.
 
-        A sensor's row is: user value, cursor, the samples' times, the samples.
+        A sensor's row is: user value, cursor, the samples' times, the samples. They are gathered
+        component by component, which the reward reads fastest.
         """
-        rows = history.reshape(len(history), -1, 2 + 4 * self.samples)
-        forces = rows[:, :, 2 + self.samples :]
-        return forces.reshape(*forces.shape[:2], self.samples, 3)
+        forces = np.take(history, self._columns, axis=1)
+        shape = (len(history), 3, self._sensors, self.samples)
+        return np.moveaxis(forces.reshape(shape), 1, 3)
+
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        sensor = np.arange(self._sensors) * (2 + 4 * self.samples)
+        first = sensor[:, None] + 2 + self.samples + 3 * np.arange(self.samples)
+        return (first[None] + np.arange(3)[:, None, None]).ravel()
+
+    @property
+    def _sensors(self) -> int:
+        return self.model.nsensor
 
 
 def build_model(robot: Robot, scene: Scene, config: TrackingConfig) -> EnvModel:

@@ -6,10 +6,11 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from omni_envs.envs.kinematics import BodyKinematics
 from omni_envs.envs.model import EnvModel
 from omni_envs.envs.variants import ModelVariants
 from omni_envs.robots import Robot
-from omni_envs.tracking.alignment import Bodies, body_twists
+from omni_envs.tracking.alignment import Bodies
 
 SPEED_LIMIT = 1e3
 """A generalized velocity beyond this (m/s, rad/s) is a numerical explosion, not a motion."""
@@ -19,7 +20,6 @@ _BAD_STATE = [
     int(mujoco.mjtWarning.mjWARN_BADQVEL),
     int(mujoco.mjtWarning.mjWARN_BADQACC),
 ]
-_POSITION_AND_VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)
 _NOTHING = int(mujoco.mjtStage.mjSTAGE_NONE)
 
 
@@ -27,6 +27,10 @@ class Simulation:
     """N simulations of a robot in its scene.
 
     Attributes:
+        batch: MuJoCo's simulations.
+        model: The model without randomization.
+        num: N.
+        variant: (N,) indices of the randomized models in use.
         qpos: (N, nq) live: robot 7 + n, then the object's 7.
         qvel: (N, nv) live; angular parts of free joints in the body frame.
         ctrl: (N, n) live joint targets, rad.
@@ -55,11 +59,8 @@ class Simulation:
         self.batch = Batch(model, num, threads)
         self.qpos, self.qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         self.ctrl, self._warmstart = self.batch.bind("ctrl"), self.batch.bind("qacc_warmstart")
-        self._xpos, self._xquat = self.batch.bind("xpos"), self.batch.bind("xquat")
-        self._cvel, self._com = self.batch.bind("cvel"), self.batch.bind("subtree_com")
         self._history = self.batch.bind("history")
-        self._root = model.body(robot.root_body).id
-        self._tracked = np.array([model.body(b).id for b in robot.tracked_bodies])
+        self._kinematics = BodyKinematics(robot, num, threads)
         self._variants, self._fields = variants, variants.expand(self.batch)
         self.variant = np.zeros(num, int)
         self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
@@ -74,7 +75,8 @@ class Simulation:
         """
         for kept, now in zip(self._before, (self.qpos, self.qvel, self._warmstart), strict=True):
             np.copyto(kept, now)
-        self.batch.step(nstep=self._substeps, stage=_POSITION_AND_VELOCITY)
+        self.batch.step(nstep=self._substeps)
+        self._kinematics.update(self.qpos, self.qvel)
         diverged = self.batch.warning[:, _BAD_STATE, 1].any(axis=1)
         # Written so that NaN counts as diverged.
         diverged |= ~(np.abs(self.qvel).max(axis=1) < SPEED_LIMIT)
@@ -95,20 +97,11 @@ class Simulation:
         self.variant[ids] = variant
         self._copy_variants(ids)
         self.qpos[ids], self.qvel[ids] = qpos, qvel
-        self.batch.forward(ids, stage=_POSITION_AND_VELOCITY)
+        self._kinematics.update(self.qpos, self.qvel, ids)
 
     def bodies(self, ids: np.ndarray | None = None) -> Bodies:
-        """Returns the tracked bodies as they are now, of all simulations or of some."""
-        if ids is None:
-            position, q, twist = (
-                np.take(a, self._tracked, axis=1) for a in (self._xpos, self._xquat, self._cvel)
-            )
-            com = self._com[:, self._root]
-        else:
-            at = (ids[:, None], self._tracked)
-            position, q, twist = self._xpos[at], self._xquat[at], self._cvel[at]
-            com = self._com[ids, self._root]
-        return Bodies(position, q, *body_twists(position, twist, com))
+        """Returns the tracked bodies: live views of all simulations, or copies of some."""
+        return self._kinematics.bodies(ids)
 
     def contact_forces(self) -> np.ndarray:
         """Returns the (N, sensors, samples, 3) contact forces of the last control step, N."""
@@ -123,6 +116,11 @@ class Simulation:
     def model_of(self, sim: int) -> mujoco.MjModel:
         """Returns a copy of the model of one simulation, randomization included."""
         return self.batch.get_model(sim)
+
+    def copy_models_to(self, other: Batch) -> None:
+        """Gives another batch of N simulations the randomized models of these."""
+        for name, live in self._fields.items():
+            other.expand(name)[:] = live
 
     def _copy_variants(self, ids: np.ndarray) -> None:
         for name, values in self._variants.fields.items():

@@ -35,6 +35,7 @@ class TrackingTask:
 
     Attributes:
         config: The numbers.
+        terms: Names of the reward terms.
         anchor: Index of the anchor among the tracked bodies.
         soft_lower: (n,) rad.
         soft_upper: (n,) rad.
@@ -72,14 +73,21 @@ class TrackingTask:
         n = robot.num_joints
         self.policy_layout = observations.policy_layout(config.observation, n)
         self.critic_layout = observations.critic_layout(n, len(names), has_object)
-        self._terms = {
-            name: getattr(config.reward, name)
-            for name in rewards.TRACKING_TERMS
-            if getattr(config.reward, name) is not None and (has_object or "object" not in name)
-        }
+        reward, dt = config.reward, config.physics.control_step
+        self._errors = [n for n in rewards.TRACKING_TERMS if has_object or "object" not in n]
+        kept = [i for i, n in enumerate(self._errors) if getattr(reward, n) is not None]
+        tracking = {self._errors[i]: getattr(reward, self._errors[i]) for i in kept}
+        self.terms = (*tracking, *rewards.PENALTY_TERMS)
+        self._columns = kept
+        self._inverse_variance = np.array([-1.0 / t.sigma**2 for t in tracking.values()])
+        weights = [t.weight for t in tracking.values()]
+        weights += [getattr(reward, name) for name in rewards.PENALTY_TERMS]
+        self._weights = np.array(weights) * dt
+        width = self.policy_layout.noise
+        noisy = np.flatnonzero(width)
+        self._noisy = slice(noisy[0], noisy[-1] + 1) if len(noisy) else slice(0, 0)
         # Uniform noise is drawn in [-½, ½).
-        self._noise_width = 2.0 * self.policy_layout.noise
-        self._dt = config.physics.control_step
+        self._noise_width = 2.0 * width[self._noisy]
 
     def full_state(self, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
         """Returns (N, nq) and (N, nv): the reference as a state of the simulation."""
@@ -128,29 +136,25 @@ class TrackingTask:
             frames.object_pose,
             self._oriented,
         )
-        terms = {}
-        for name, term in self._terms.items():
-            value = rewards.tracking_reward(getattr(squared, name), term.sigma)
-            terms[name] = value * (term.weight * self._dt)
         count = (
             rewards.substeps_in_contact
             if config.contact_rule == "substeps"
             else rewards.bodies_in_contact
         )
-        joints = qpos[:, self._joints]
-        for name, weight, penalty in (
-            ("action_rate", config.action_rate, rewards.action_rate(action, previous_action)),
-            (
-                "joint_limit",
-                config.joint_limit,
-                rewards.joint_limit_excess(joints, self.soft_lower, self.soft_upper),
-            ),
-            ("contact", config.contact, count(contact_forces, config.contact_force)),
-        ):
-            terms[name] = penalty * (weight * self._dt)
-        errors = {k: np.sqrt(v) for k, v in squared._asdict().items() if v is not None}
+        joint_position = qpos[:, self._joints]
+        penalties = [
+            rewards.action_rate(action, previous_action),
+            rewards.joint_limit_excess(joint_position, self.soft_lower, self.soft_upper),
+            count(contact_forces, config.contact_force),
+        ]
+        # All tracking terms at once, one column each.
+        e = np.stack([v for v in squared if v is not None], axis=1)
+        tracking = np.exp(e[:, self._columns] * self._inverse_variance)
+        values = np.concatenate([tracking, np.stack(penalties, axis=1)], axis=1) * self._weights
+        terms = dict(zip(self.terms, values.T, strict=True))
+        errors = dict(zip(self._errors, np.sqrt(e).T, strict=True))
         tests = self._tests(bodies, reference, squared, object_active)
-        return Judgement(sum(terms.values()), terms, errors, tests)
+        return Judgement(values.sum(axis=1), terms, errors, tests)
 
     def _tests(
         self,
@@ -226,10 +230,10 @@ class TrackingTask:
         )
         policy = observations.policy_observation(state, config.state_estimation).astype(np.float32)
         if config.noise is not None:
-            noise = rng.random(policy.shape, dtype=np.float32)
+            noise = rng.random((len(policy), len(self._noise_width)), dtype=np.float32)
             noise -= 0.5
             noise *= self._noise_width
-            policy += noise
+            policy[:, self._noisy] += noise
         if not config.privileged:
             return policy
         critic = observations.critic_observation(state).astype(np.float32)

@@ -56,6 +56,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         references: What is tracked.
         policy_layout: Names and slices of the policy's observation.
         critic_layout: Names and slices of the privileged observation.
+        simulation: The physics.
+        sampler: Where episodes start.
         divergences: The latest diverged simulations, for replay.
 
     Args:
@@ -143,7 +145,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._variants = ModelVariants(
             env_model.model, self.robot, self.scene.object, config.randomization
         )
-        self._sim = Simulation(
+        self.simulation = Simulation(
             env_model, self.robot, self._variants, num_envs, config.physics.substeps, num_threads
         )
         if max_episode_steps is None and config.termination.max_seconds is not None:
@@ -247,16 +249,16 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             # From here on the standard action of the same joint target: rewards and the observed
             # previous action then mean the same in both modes, and for an exported policy.
             action += (frames.qpos[:, 7:] - self.robot.default_joint_array) / self._scale
-        np.copyto(self._sim.ctrl, episodes.default + self._scale * action)
-        diverged = self._sim.step() | bad
-        bodies = self._sim.bodies()
+        np.copyto(self.simulation.ctrl, episodes.default + self._scale * action)
+        diverged = self.simulation.step() | bad
+        bodies = self.simulation.bodies()
         judged = self._task.judge(
-            self._sim.qpos,
+            self.simulation.qpos,
             bodies,
             frames,
             action,
             episodes.action,
-            self._sim.contact_forces(),
+            self.simulation.contact_forces(),
             self._gate.open,
         )
         terminated = diverged.copy()
@@ -302,7 +304,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             width, height = self._size
             self._renderer = SceneRenderer(self.robot, self.scene, width=width, height=height)
         nq, frames = self.robot.nq, self._frames
-        qpos = self._sim.qpos[index]
+        qpos = self.simulation.qpos[index]
         return self._renderer.render(
             qpos[:nq],
             qpos[nq : nq + 7] if self._library.has_object else None,
@@ -339,18 +341,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             return
         rng, count = self.np_random, len(ids)
         motions, places = self.sampler.draw(count, rng)
-        if motion is not None:
-            motions = np.broadcast_to(np.asarray(motion, int), count)
         if frame is not None or motion is not None:
-            places = np.broadcast_to(np.asarray(0 if frame is None else frame, int), count)
-        last = self._library.lengths[motions % self._library.num_motions] - 2
-        if (motions != motions % self._library.num_motions).any() or (
-            places != np.clip(places, 0, last)
-        ).any():
-            raise InvalidOptionError(
-                f"reset: motion must be below {self._library.num_motions} and frame between 0 and "
-                "the last but one frame of the motion."
-            )
+            motions, places = self._place_of(motion, frame, count)
         start = self._library.frames(self._library.starts[motions] + places)
         qpos, qvel = self._task.full_state(start)
         qpos, qvel = start_state(
@@ -361,19 +353,35 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self._task.soft_upper,
             rng,
         )
-        self._sim.reset(ids, qpos, qvel, rng.integers(self._variants.count, size=count))
+        self.simulation.reset(ids, qpos, qvel, rng.integers(self._variants.count, size=count))
         self._episodes.start(ids, motions, places, rng)
         self._frames = self._library.frames(self._episodes.table_index)
+
+    def _place_of(
+        self, motion: int | np.ndarray | None, frame: int | np.ndarray | None, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        motions = np.broadcast_to(np.asarray(0 if motion is None else motion), count)
+        places = np.broadcast_to(np.asarray(0 if frame is None else frame), count)
+        lengths = self._library.lengths
+        inside = np.isin(motions, np.arange(len(lengths))).all()
+        if not inside or not ((places >= 0) & (places <= lengths[motions] - 2)).all():
+            raise InvalidOptionError(
+                f"reset: motion must be below {len(lengths)} and frame from 0 to the last but one "
+                f"of the motion; the motions have {lengths.tolist()} frames."
+            )
+        return motions, places
 
     def _push(self, done: np.ndarray) -> None:
         due = self._episodes.due_pushes(self.np_random)
         due = due[~done[due]]
         config = self.config.randomization.push
         if len(due) and config is not None:
-            self._sim.qvel[due, :6] += push(self._sim.qpos[due, 3:7], config, self.np_random)
+            self.simulation.qvel[due, :6] += push(
+                self.simulation.qpos[due, 3:7], config, self.np_random
+            )
 
     def _observe(self, ids: np.ndarray | None = None, bodies: Any = None) -> Observation:
-        sim, episodes, frames = self._sim, self._episodes, self._frames
+        sim, episodes, frames = self.simulation, self._episodes, self._frames
         assert frames is not None
         if ids is None:
             bodies = sim.bodies() if bodies is None else bodies
@@ -385,7 +393,9 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         return self._task.observe(*rows, self.np_random)
 
     def _infos(self, judged: Any, diverged: np.ndarray) -> dict[str, Any]:
-        values = {f"reward/{k}": np.where(diverged, 0.0, v) for k, v in judged.terms.items()}
+        values = {f"reward/{k}": v for k, v in judged.terms.items()}
+        if diverged.any():
+            values = {k: np.where(diverged, 0.0, v) for k, v in values.items()}
         values |= {f"error/{k}": v for k, v in judged.errors.items()}
         values |= {f"terminated/{k}": v for k, v in judged.tests.items()}
         return batched_infos(values | {"diverged": diverged})
@@ -397,7 +407,9 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     def _record_divergence(self, ids: np.ndarray) -> None:
         for i in ids:
             motion, frame = int(self._episodes.motion[i]), int(self._episodes.frame[i])
-            self.divergences.append(Divergence(int(i), motion, frame, **self._sim.before(int(i))))
+            self.divergences.append(
+                Divergence(int(i), motion, frame, **self.simulation.before(int(i)))
+            )
 
 
 def _copy(observations: Observation) -> Observation:

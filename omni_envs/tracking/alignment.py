@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from omni_envs.tracking import quaternion
-from omni_envs.tracking.array_api import Array, array_namespace
+from omni_envs.tracking.array_api import Array, array_namespace, dot
 
 
 class Bodies(NamedTuple):
@@ -22,22 +22,6 @@ class Bodies(NamedTuple):
     quaternion: Array
     linear_velocity: Array
     angular_velocity: Array
-
-
-def body_twists(position: Array, twist: Array, centre_of_mass: Array) -> tuple[Array, Array]:
-    """Moves MuJoCo's body velocities from the tree's centre of mass to the body origins.
-
-    Args:
-        position: (N, B, 3) body origins.
-        twist: (N, B, 6) MuJoCo's ``cvel``: angular, then linear velocity at the centre of mass.
-        centre_of_mass: (N, 3) of the kinematic tree.
-
-    Returns:
-        Linear (N, B, 3) and angular (N, B, 3) velocities in the world.
-    """
-    angular = twist[..., :3]
-    arm = position - centre_of_mass[:, None, :]
-    return twist[..., 3:] + quaternion.cross(angular, arm), angular
 
 
 class Alignment(NamedTuple):
@@ -61,8 +45,7 @@ class Alignment(NamedTuple):
     def positions(self, position: Array) -> Array:
         """Returns the re-aligned positions of (N, B, 3) reference positions."""
         xp = array_namespace(position)
-        c, s = self.half_cosine, self.half_sine
-        cosine, sine = (c * c - s * s)[:, None], (2.0 * c * s)[:, None]
+        cosine, sine = self._rotation()
         arm = position - self.pivot[:, None, :]
         x, y = arm[..., 0], arm[..., 1]
         turned = xp.stack([cosine * x - sine * y, sine * x + cosine * y, arm[..., 2]], -1)
@@ -70,14 +53,41 @@ class Alignment(NamedTuple):
 
     def quaternions(self, q: Array) -> Array:
         """Returns the re-aligned orientations of (N, B, 4) reference orientations."""
-        c, s = self.half_cosine[:, None, None], self.half_sine[:, None, None]
-        return c * q + s * turned_about_z(q)
+        xp = array_namespace(q)
+        zero = xp.zeros_like(self.half_cosine)
+        delta = xp.stack([self.half_cosine, zero, zero, self.half_sine], -1)
+        return quaternion.multiply(delta[:, None, :], q)
 
+    def squared_distance(self, position: Array, reference: Array) -> Array:
+        """Returns (N,) means over the bodies of the squared distances ‖p - p'‖².
 
-def turned_about_z(q: Array) -> Array:
-    """Returns k ⊗ q with k = (0, 0, 0, 1): half a turn about the world's z axis after ``q``."""
-    xp = array_namespace(q)
-    return xp.stack([-q[..., 3], -q[..., 2], q[..., 1], q[..., 0]], -1)
+        Args:
+            position: (N, B, 3) of the robot.
+            reference: (N, B, 3) of the reference, not re-aligned.
+        """
+        cosine, sine = self._rotation()
+        p = position - self.origin[:, None, :]
+        r = reference - self.pivot[:, None, :]
+        rx, ry = r[..., 0], r[..., 1]
+        dx = p[..., 0] - cosine * rx + sine * ry
+        dy = p[..., 1] - sine * rx - cosine * ry
+        dz = p[..., 2] - r[..., 2]
+        return (dot(dx, dx) + dot(dy, dy) + dot(dz, dz)) / position.shape[1]
+
+    def angle(self, q: Array, reference: Array) -> Array:
+        """Returns (N, B) angles between orientations q and q' of (N, B, 4) arrays, rad.
+
+        <q, Δ r> = c <q, r> + s <q, k r> with k r = (-r_z, -r_y, r_x, r_w).
+        """
+        xp = array_namespace(q)
+        turned = q * xp.flip(reference, (-1,))
+        k = turned[..., 2] + turned[..., 3] - turned[..., 0] - turned[..., 1]
+        c, s = self.half_cosine[:, None], self.half_sine[:, None]
+        return quaternion.angle_of_dot(c * dot(q, reference) + s * k)
+
+    def _rotation(self) -> tuple[Array, Array]:
+        c, s = self.half_cosine, self.half_sine
+        return (c * c - s * s)[:, None], (2.0 * c * s)[:, None]
 
 
 def align(
@@ -92,7 +102,6 @@ def align(
         reference_orientation: (N, 4) of the reference's anchor body.
     """
     xp = array_namespace(position)
-    turn = quaternion.multiply(orientation, quaternion.conjugate(reference_orientation))
-    delta = quaternion.yaw_only(turn)
+    half = quaternion.half_yaw(quaternion.multiply_conjugate(orientation, reference_orientation))
     origin = xp.concat([position[:, :2], reference_position[:, 2:]], -1)
-    return Alignment(delta[:, 0], delta[:, 3], origin, reference_position)
+    return Alignment(xp.cos(half), xp.sin(half), origin, reference_position)

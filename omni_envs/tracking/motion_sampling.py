@@ -28,6 +28,7 @@ class MotionSampler:
         self.config = config
         # An episode needs one more frame after its first to track.
         self._last_start = library.lengths - 2
+        self._uniform_ends = np.cumsum(library.lengths - 1)
         self._starts = library.starts
         counts = library.lengths // BIN_FRAMES + 1
         self.bin_motion = np.repeat(np.arange(library.num_motions), counts)
@@ -109,7 +110,7 @@ class MotionSampler:
             motion = rng.integers(len(self._starts), size=count)
             return motion, np.zeros(count, int)
         # Uniform over all start frames of all motions: long motions are drawn more often.
-        ends = np.cumsum(self._last_start + 1)
+        ends = self._uniform_ends
         place = rng.integers(ends[-1], size=count)
         motion = np.searchsorted(ends, place, side="right")
         return motion, place - (ends[motion] - (self._last_start[motion] + 1))

@@ -195,20 +195,20 @@ def critic_observation(state: ObservedState) -> Array:
     xp = array_namespace(state.joint_position)
     n = state.joint_position.shape[0]
     anchor = state.anchor_quaternion[:, None, :]
-    to_anchor = quaternion.conjugate(anchor)
     arm = state.bodies.position - state.anchor_position[:, None, :]
     parts = [
         policy_observation(state),
         xp.reshape(quaternion.rotate_inverse(anchor, arm), (n, -1)),
         xp.reshape(
-            quaternion.rot6d(quaternion.multiply(to_anchor, state.bodies.quaternion)), (n, -1)
+            quaternion.rot6d(quaternion.conjugate_multiply(anchor, state.bodies.quaternion)),
+            (n, -1),
         ),
     ]
     if state.object_pose is not None and state.object_linear_velocity is not None:
-        pose, anchor, to_anchor = state.object_pose, anchor[:, 0], to_anchor[:, 0]
+        pose, anchor = state.object_pose, state.anchor_quaternion
         parts += [
             quaternion.rotate_inverse(anchor, pose[:, :3] - state.anchor_position),
-            quaternion.rot6d(quaternion.multiply(to_anchor, pose[:, 3:])),
+            quaternion.rot6d(quaternion.conjugate_multiply(anchor, pose[:, 3:])),
             quaternion.rotate_inverse(anchor, state.object_linear_velocity),
         ]
     return xp.concat(parts, -1)

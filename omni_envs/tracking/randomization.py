@@ -41,20 +41,28 @@ def start_state(
     qpos, qvel = qpos.copy(), qvel.copy()
     if noise is None:
         return qpos, qvel
-    count, n = len(qpos), len(lower)
-    root, joints = qpos[:, 3:7], slice(7, 7 + n)
-    spin = quaternion.rotate(root, qvel[:, 3:6])
-    spin += symmetric(rng, count, noise.root_angular_velocity)
-    turn = quaternion.from_euler(symmetric(rng, count, noise.root_orientation))
-    root = quaternion.multiply(turn, root)
-    qpos[:, :3] += symmetric(rng, count, noise.root_position)
-    qpos[:, 3:7] = root
-    qvel[:, :3] += symmetric(rng, count, noise.root_linear_velocity)
-    qvel[:, 3:6] = quaternion.rotate_inverse(root, spin)
-    disturbed = qpos[:, joints] + symmetric(rng, count, [noise.joint_position] * n)
-    qpos[:, joints] = np.clip(disturbed, lower, upper)
-    if qpos.shape[1] > 7 + n:
-        qpos[:, 7 + n : 10 + n] += symmetric(rng, count, noise.object_position)
+    n = len(lower)
+    widths = (
+        *noise.root_position,
+        *noise.root_orientation,
+        *noise.root_linear_velocity,
+        *noise.root_angular_velocity,
+        *noise.object_position,
+        *[noise.joint_position] * n,
+    )
+    draws = symmetric(rng, len(qpos), widths)
+    position, orientation, linear, spin, object_position = (
+        draws[:, 3 * i : 3 * i + 3] for i in range(5)
+    )
+    turned = quaternion.multiply(quaternion.from_euler(orientation), qpos[:, 3:7])
+    spin = spin + quaternion.rotate(qpos[:, 3:7], qvel[:, 3:6])
+    qpos[:, :3] += position
+    qpos[:, 3:7] = turned
+    qvel[:, :3] += linear
+    qvel[:, 3:6] = quaternion.rotate_inverse(turned, spin)
+    joints = slice(7, 7 + n)
+    qpos[:, joints] = np.clip(qpos[:, joints] + draws[:, 15:], lower, upper)
+    qpos[:, 7 + n : 10 + n] += object_position[:, : qpos.shape[1] - 7 - n]
     return qpos, qvel
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from omni_envs.tracking import quaternion
-from omni_envs.tracking.alignment import Alignment, Bodies, turned_about_z
+from omni_envs.tracking.alignment import Alignment, Bodies
 from omni_envs.tracking.array_api import Array, array_namespace, dot
 
 TRACKING_TERMS = (
@@ -77,18 +77,14 @@ def tracking_errors(
     anchor_angle = quaternion.angle(q[:, anchor], r[:, anchor])
     if orientation_bodies is not None:
         q, r = q[:, orientation_bodies], r[:, orientation_bodies]
-    # <q, Δ r> without building Δ r.
-    c, s = alignment.half_cosine[:, None], alignment.half_sine[:, None]
-    angles = quaternion.angle_of_dot(c * dot(q, r) + s * dot(q, turned_about_z(r)))
+    angles = alignment.angle(q, r)
     has_object = object_pose is not None and reference_object_pose is not None
     if has_object:
         object_angle = quaternion.angle(object_pose[:, 3:], reference_object_pose[:, 3:])
     return TrackingErrors(
         anchor_position=squared_distance(robot.position[:, anchor], reference.position[:, anchor]),
         anchor_orientation=anchor_angle * anchor_angle,
-        body_position=mean_squared_distance(
-            robot.position, alignment.positions(reference.position)
-        ),
+        body_position=alignment.squared_distance(robot.position, reference.position),
         body_orientation=dot(angles, angles) / angles.shape[1],
         body_linear_velocity=mean_squared_distance(
             robot.linear_velocity, reference.linear_velocity
@@ -117,8 +113,8 @@ def action_rate(action: Array, previous: Array) -> Array:
 def joint_limit_excess(joint_position: Array, lower: Array, upper: Array) -> Array:
     """Returns (N,) sums of the excess of (N, n) joint positions over soft limits (n,), rad."""
     xp = array_namespace(joint_position)
-    inside = xp.clip(joint_position, lower, upper)
-    return xp.sum(xp.abs(joint_position - inside), axis=-1)
+    outside = xp.maximum(joint_position - upper, lower - joint_position)
+    return xp.sum(xp.clip(outside, 0.0, None), axis=-1)
 
 
 def bodies_in_contact(force: Array, threshold: float) -> Array:
@@ -132,8 +128,7 @@ def bodies_in_contact(force: Array, threshold: float) -> Array:
         (N,) counts.
     """
     xp = array_namespace(force)
-    touched = xp.any(dot(force, force) > threshold**2, axis=-1)
-    return xp.sum(touched, axis=-1)
+    return xp.sum(xp.any(_strong(force, threshold), axis=-1), axis=-1)
 
 
 def substeps_in_contact(force: Array, threshold: float) -> Array:
@@ -147,5 +142,9 @@ def substeps_in_contact(force: Array, threshold: float) -> Array:
         (N,) counts.
     """
     xp = array_namespace(force)
-    touched = xp.any(dot(force, force) > threshold**2, axis=-2)
-    return xp.sum(touched, axis=-1)
+    return xp.sum(xp.any(_strong(force, threshold), axis=-2), axis=-1)
+
+
+def _strong(force: Array, threshold: float) -> Array:
+    x, y, z = force[..., 0], force[..., 1], force[..., 2]
+    return x * x + y * y + z * z > threshold**2
