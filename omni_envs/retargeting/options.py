@@ -25,12 +25,15 @@ class StanceOptions:
         anchored: Stance set in which the whole sole stays where it was at the start of the interval. None
             anchors nothing.
         tolerance: Half width of the window of an anchored toe tip, m.
+        heart_tolerance: Half width of the window of the heart of an anchored sole about the toe tip, m: room
+            for some 8° of roll.
         loose: Wider stance set in which the sole may move slowly. None leaves it free.
         loose_speed: Largest speed of a sole point in the loose set, m/s.
     """
 
     anchored: StanceMode | None = "default"
     tolerance: float = 1e-4
+    heart_tolerance: float = 1.2e-3
     loose: StanceMode | None = "code"
     loose_speed: float = 0.08
 

@@ -179,7 +179,7 @@ class _Retargeter:
         iterations = np.empty(frames, int)
         violations = np.empty((frames, len(RELAXATIONS)))
         plan, previous = self._sketch()
-        stance = StanceLimit(plan, self.options.stance.tolerance)
+        stance = StanceLimit(plan, self.options.stance)
         self.limits.append(stance)
         foothold = FootholdTask(plan)
         self.solver.tasks.append(foothold)

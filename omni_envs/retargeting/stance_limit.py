@@ -6,28 +6,29 @@ import numpy as np
 
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import STANCE, RowLimit, Rows
+from omni_envs.retargeting.options import StanceOptions
 from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE, StancePlan
 
-TIP, LEFT = 0, 2
-"""Rows of ``Kinematics.feet``: the toe tip, and the arm from there to the left."""
+TIP, HEART, LEFT = 0, 1, 2
+"""Rows of ``Kinematics.feet``: the toe tip, and the arms from there to the heart and to the left."""
 
 
 class StanceLimit(RowLimit):
     """Windows of both feet on the current frame of a plan.
 
-    An anchored foot keeps its **absolute** place and heading: a window about the previous frame, as in the
-    official code, lets the foot creep. It may roll over its toes, which is not slip, and turn on them where
-    the human does; non-penetration holds the rest of the sole above the ground.
+    An anchored foot keeps its **absolute** place: a window about the previous frame, as in the official
+    code, lets the foot creep. Toe tip and heart hold the whole sole; where the plan rolls the foot over its
+    toes or turns it on them, which is not slip, the heart is free to. Non-penetration holds the sole above
+    the ground.
 
     Args:
         plan: Where the feet should be.
-        tolerance: Half width of the window of the heading, as way of a point 0.1 m from the tip, m.
+        options: Settings.
     """
 
-    def __init__(self, plan: StancePlan, tolerance: float) -> None:
-        self._plan = plan
-        self._tolerance = tolerance
-        self._tips, self._forward = np.zeros((2, 2)), np.zeros((2, 2))
+    def __init__(self, plan: StancePlan, options: StanceOptions) -> None:
+        self._plan, self._options = plan, options
+        self._tips, self._arms, self._forward = np.zeros((3, 2, 2))
 
     def hold(self, t: int) -> None:
         """Chooses frame t of the plan. ``record`` must have been called on frame t - 1."""
@@ -43,7 +44,9 @@ class StanceLimit(RowLimit):
         held = np.isfinite(plan.tip_slack[t]) | (plan.tier[t] == LOOSE)
         self._held = np.flatnonzero(held & np.isfinite(low[:, 0]))
         self._low, self._high = low[self._held], high[self._held]
-        self._staying = np.flatnonzero(stays & ~plan.pivots[t])
+        turns, rolls = plan.turns[t], plan.rolls[t]
+        self._flat = np.flatnonzero(stays & ~turns & ~rolls)
+        self._rolling = np.flatnonzero(stays & ~turns & rolls)
 
     def record(self, configuration: Kinematics, t: int) -> None:
         """Remembers where frame t has put the feet, except those that it held in their place."""
@@ -53,8 +56,10 @@ class StanceLimit(RowLimit):
         reached = (plan.tier[t] == ANCHORED) & (missed <= plan.tip_slack[t] + 1e-4)
         moved = ~self._stays(t)
         self._tips[moved] = np.where(reached[:, None], plan.tips[t], feet[:, TIP])[moved]
-        self._forward[moved] = feet[moved, LEFT, ::-1] * [1.0, -1.0]
-        self._forward /= np.linalg.norm(self._forward, axis=1, keepdims=True)
+        self._arms[moved] = feet[moved, HEART]
+        left = feet[moved, LEFT]
+        forward = left[:, ::-1] * [1.0, -1.0]
+        self._forward[moved] = forward / np.linalg.norm(left, axis=1, keepdims=True)
 
     def _stays(self, t: int) -> np.ndarray:
         """(2,) whether each foot keeps the place of the frame before."""
@@ -62,21 +67,27 @@ class StanceLimit(RowLimit):
         return (tier[t] == ANCHORED) & (tier[t - 1] == ANCHORED) if t > 0 else np.zeros(2, bool)
 
     def rows(self, configuration: Kinematics) -> Rows | None:
-        """Returns two rows for a held toe tip and one for a held heading."""
-        if not (len(self._held) or len(self._staying)):
+        """Returns two rows for a held toe tip, two for a flat foot and one for a rolling one."""
+        if not len(self._held):
             return None
         feet = configuration.feet()
         jacobian = configuration.feet_jacobians(feet)
+        nv = jacobian.shape[-1]
+        tips, arms = feet[self._held, TIP, :2], feet[self._flat, HEART, :2]
         # The arm to the left keeps no component along the heading.
-        forward = self._forward[self._staying]
-        turned = (feet[self._staying, LEFT, :2] * forward).sum(axis=1)
-        tips = feet[self._held, TIP, :2]
+        forward = self._forward[self._rolling]
+        turned = (feet[self._rolling, LEFT, :2] * forward).sum(axis=1)
         A = np.concatenate(
             [
-                jacobian[self._held, TIP].reshape(-1, jacobian.shape[-1]),
-                (jacobian[self._staying, LEFT] * forward[:, :, None]).sum(axis=1),
+                jacobian[self._held, TIP].reshape(-1, nv),
+                jacobian[self._flat, HEART].reshape(-1, nv),
+                (jacobian[self._rolling, LEFT] * forward[:, :, None]).sum(axis=1),
             ]
         )
-        lower = np.concatenate([(self._low - tips).ravel(), -self._tolerance - turned])
-        upper = np.concatenate([(self._high - tips).ravel(), self._tolerance - turned])
+        arm = (self._arms[self._flat] - arms).ravel()
+        centre = np.concatenate([np.zeros(tips.size), arm, -turned])
+        slack = np.full(len(centre), self._options.heart_tolerance)
+        lower, upper = centre - slack, centre + slack
+        lower[: tips.size] = (self._low - tips).ravel()
+        upper[: tips.size] = (self._high - tips).ravel()
         return Rows(A, lower, upper, np.full(len(lower), STANCE))

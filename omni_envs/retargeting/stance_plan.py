@@ -4,8 +4,8 @@ Anchoring a foot where it happens to be when a stance begins puts it in the wron
 still settles. A foothold in the middle of where the foot would like to be over the whole interval costs a
 tenth of the deformation energy. So a coarse pass without stance finds the wishes, and the plan keeps
 
-* the toe tip of an *anchored* foot in one place: with its heading, which ``StanceLimit`` keeps as well, it
-  may roll over its toes, but not slide or turn;
+* the toe tip of an *anchored* foot in one place, and by ``StanceLimit`` the whole sole, but where the human
+  rolls or turns the foot far on its toes;
 * the toe tip of a *loose* foot below a speed;
 * consecutive footholds within reach of each other.
 """
@@ -27,8 +27,10 @@ FREE, LOOSE, ANCHORED = 0, 1, 2
 _DETOUR = 0.6  # m/s
 _FUNNEL = 0.15  # m: no window wider than this
 _FLAT = 3e-3  # m: a stance whose arm from tip to heart changes less, seen from above, does not roll
-# A heading is planned where the wish hardly turns (rad) and the foot lies (horizontal part of its left axis).
-_STEADY, _LYING = 0.5, 0.9
+# A foot that would turn (rad) or roll (change of the arm from above, m) by more than this while it stands is
+# let: forcing it to stand flat and still contorts the robot, as in a crawl.
+_TURN, _ROLL = 1.5, 0.026
+_LYING = 0.9  # least horizontal part of the unit axis to the left with which a foot has a heading
 # Pull of the planned heading on a landing foot: frames before landing that feel it, and its weight.
 _APPROACH, _PULL = 8, 50.0
 
@@ -56,7 +58,8 @@ class StancePlan:
 
     Attributes:
         tier: (T, 2) ``FREE``, ``LOOSE`` or ``ANCHORED``.
-        pivots: (T, 2) the foot turns on its toes: its heading is free.
+        turns: (T, 2) the foot turns on its toes while it stands: its heading is free.
+        rolls: (T, 2) the foot rolls over its toes while it stands: its pitch is free.
         tips: (T, 2, 2) horizontal place of the toe tip, m.
         tip_slack: (T, 2) half width of its window, infinite for none: the tolerance on the foothold, and
             before it what the foot can still go, m.
@@ -67,7 +70,8 @@ class StancePlan:
     """
 
     tier: np.ndarray
-    pivots: np.ndarray
+    turns: np.ndarray
+    rolls: np.ndarray
     tips: np.ndarray
     tip_slack: np.ndarray
     tip_step: np.ndarray
@@ -116,7 +120,7 @@ def plan_stance(
     tips, headings = wishes.tips.copy(), wishes.headings.copy()
     tip_slack = np.full(tier.shape, np.inf)
     arms, arm_weights = np.zeros((*tier.shape, 2)), np.zeros((*tier.shape, 2))
-    pivots = np.zeros(tier.shape, bool)
+    turns, rolls = np.zeros(tier.shape, bool), np.zeros(tier.shape, bool)
     for foot in range(2):
         runs = _runs(tier[:, foot] == ANCHORED)
         if not runs:
@@ -128,10 +132,9 @@ def plan_stance(
         tip_slack[:, foot] = _funnel(runs, detour[:, foot], options.tolerance)
         for start, end in runs:
             wish, reach = wishes.headings[start:end, foot], wishes.reach[start:end, foot]
-            if wishes.lying[start:end, foot].min() < _LYING:
-                continue
-            if np.ptp(wish) > _STEADY:
-                pivots[start:end, foot] = True
+            turns[start:end, foot] = np.ptp(wish) > _TURN
+            rolls[start:end, foot] = np.ptp(reach) > _ROLL
+            if turns[start, foot] or wishes.lying[start:end, foot].min() < _LYING:
                 continue
             first = max(start - _APPROACH, 0)
             headings[first:end, foot] = wish.mean()
@@ -140,7 +143,7 @@ def plan_stance(
                 arms[first:end, foot, 0] = np.median(reach)
                 arm_weights[first + _APPROACH // 2 : end, foot, 0] = _PULL
     forward = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
-    return StancePlan(tier, pivots, tips, tip_slack, tip_step, forward, arms, arm_weights)
+    return StancePlan(tier, turns, rolls, tips, tip_slack, tip_step, forward, arms, arm_weights)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
