@@ -8,6 +8,8 @@ import json
 import os
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -71,24 +73,35 @@ def cached_reference(
     found = _read(path, key)
     if found is not None:
         return found
-    try:
+    lock = FileLock(path.with_suffix(".lock"))
+    with _writing(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with FileLock(path.with_suffix(".lock")):
-            found = _read(path, key, warn=True)
-            if found is None:
+        lock.acquire()
+    try:
+        found = _read(path, key, warn=True)
+        if found is None:
+            found = make_reference(
+                demonstration, robot, fps=fps, options=options, progress=progress
+            )
+            found = dataclasses.replace(found, provenance={**found.provenance, "key": key})
+            with _writing(path.parent):
                 for leftover in path.parent.glob(f".{path.name}.*.tmp"):
                     leftover.unlink()  # of a writer that was killed: only the lock's holder writes
-                found = make_reference(
-                    demonstration, robot, fps=fps, options=options, progress=progress
-                )
-                found = dataclasses.replace(found, provenance={**found.provenance, "key": key})
                 found.save(path)
+    finally:
+        lock.release()
+    return found
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         raise OmniEnvsError(
-            f"The cache folder {path.parent} cannot be written to ({error.strerror or error}); "
+            f"The cache folder {folder} cannot be written to ({error.strerror or error}); "
             f"name another one in {VARIABLE}."
         ) from error
-    return found
 
 
 def reference_key(

@@ -1,0 +1,102 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from omni_envs.demonstrations import builtin_demonstration
+from omni_envs.errors import InvalidDataError, UnknownNameError
+from omni_envs.references import Reference, evaluate_reference, make_reference
+from omni_envs.retargeting import RetargetOptions
+from omni_envs.robots import G1
+
+
+@pytest.fixture(scope="module")
+def demonstration():
+    whole = builtin_demonstration("box_carry")
+    part = slice(60, 90)
+    return replace(
+        whole,
+        positions=whole.positions[part],
+        object_poses=whole.object_poses[part],
+        orientations=None if whole.orientations is None else whole.orientations[part],
+        contacts={link: flags[part] for link, flags in whole.contacts.items()},
+    )
+
+
+@pytest.fixture(scope="module")
+def reference(demonstration):
+    return make_reference(demonstration, "g1")
+
+
+def test_the_reference_follows_the_demonstration_at_its_rate(demonstration, reference):
+    assert (reference.robot, reference.fps) == ("g1", 50.0)
+    assert reference.num_frames == 49  # 29/30 s
+    assert reference.source.num_frames == 49
+    assert reference.source.scale == pytest.approx(G1.height / demonstration.height)
+    np.testing.assert_allclose(reference.object_poses, reference.source.object_poses, atol=1e-9)
+    np.testing.assert_array_equal(reference.stance, reference.source.stance["default"])
+    assert reference.contacts.keys() == reference.source.contacts.keys()
+
+
+def test_the_report_proves_the_constraints(reference):
+    summary = reference.report.summary()
+    assert summary["penetration_max_m"] < 1e-3
+    assert summary["self_penetration_max_m"] < 1e-3
+    assert summary["joint_violation_max_rad"] < 1e-9
+    assert summary["velocity_violation_max_rad_s"] < 1e-6
+    assert summary["relaxed_frames"] == 0
+    assert summary["energy_mean"] < 0.1
+
+
+def test_provenance_says_how_to_make_it_again(demonstration, reference):
+    provenance = reference.provenance
+    assert provenance["demonstration"] == demonstration.name
+    assert provenance["licence"] == demonstration.licence
+    assert provenance["options"]["laplacian_weight"] == 10.0
+    assert provenance["versions"].keys() == {"omni_envs", "mujoco"}
+    assert provenance["solved_frames"] == reference.num_frames
+    assert provenance["solve_seconds"] > 0
+
+
+def test_the_file_holds_report_and_source(reference, tmp_path):
+    back = Reference.load(reference.save(tmp_path / "r.npz"))
+    assert back.report.summary() == reference.report.summary()
+    assert back.provenance == reference.provenance
+    np.testing.assert_array_equal(back.source.keypoints, reference.source.keypoints)
+    assert back.source.stance.keys() == reference.source.stance.keys()
+    for link, points in reference.source.contact_points.items():
+        np.testing.assert_array_equal(back.source.contact_points[link], points)
+
+
+def test_evaluating_anew_gives_the_same_report(reference):
+    anew = evaluate_reference(reference).summary()
+    for name, value in reference.report.summary().items():
+        assert anew[name] == (value if value is None else pytest.approx(value, abs=1e-9)), name
+
+
+def test_a_tampered_motion_does_not_keep_its_report(reference):
+    qpos = reference.qpos.copy()
+    qpos[:, 2] -= 0.05
+    assert evaluate_reference(replace(reference, qpos=qpos)).summary()["penetration_max_m"] > 0.04
+
+
+def test_options_and_progress_reach_the_retargeter(demonstration):
+    calls = []
+    reference = make_reference(
+        demonstration,
+        G1,
+        fps=10.0,
+        options=RetargetOptions(laplacian_weight=5.0),
+        progress=lambda done, total: calls.append((done, total)),
+    )
+    assert reference.fps == 10.0
+    assert reference.provenance["options"]["laplacian_weight"] == 5.0
+    assert calls[-1][0] == calls[-1][1]
+    assert [done for done, _ in calls] == sorted(done for done, _ in calls)
+
+
+def test_bad_arguments_are_refused(demonstration):
+    with pytest.raises(UnknownNameError, match="r2d2"):
+        make_reference(demonstration, "r2d2")
+    with pytest.raises(InvalidDataError, match="fps"):
+        make_reference(demonstration, "g1", fps=0.0)
