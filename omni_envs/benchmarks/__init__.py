@@ -1,0 +1,1 @@
+"""Figures: how fast things are, beside what they are compared with."""
