@@ -199,7 +199,8 @@ class Robot:
         """Holds the description against the file: joints in order, every named body there."""
         named = {self.root_body, self.anchor_body, self.torso_body}
         named.update(self.tracked_bodies, self.end_effectors, *self.contact_links.values())
-        named.update(p.body for p in (*self.keypoints.values(), *self.feet.values()))
+        named.update(point.body for point in self.keypoints.values())
+        named.update(foot.body for foot in self.feet.values())
         missing = sorted(named - {b.name for b in spec.bodies})
         if missing:
             raise self._invalid("bodies", f"bodies of {self.mjcf.name}", f"unknown {missing}")
