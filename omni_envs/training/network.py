@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from omni_envs.errors import MissingDependencyError
 
 try:
@@ -39,36 +37,40 @@ class Actor(nn.Module):
         normalizer: RunningNormalizer,
         hidden: nn.Module,
         output: nn.Linear,
-        low: np.ndarray,
-        high: np.ndarray,
+        low: Tensor,
+        high: Tensor,
     ) -> None:
         super().__init__()
         self.normalizer, self.hidden, self.output = normalizer, hidden, output
-        self.register_buffer("low", torch.as_tensor(low, dtype=torch.float32))
-        self.register_buffer("high", torch.as_tensor(high, dtype=torch.float32))
+        self.register_buffer("low", low)
+        self.register_buffer("high", high)
 
     @classmethod
-    def from_weights(
-        cls, weights: Mapping[str, Tensor], low: np.ndarray, high: np.ndarray
-    ) -> Actor:
+    def from_weights(cls, weights: Mapping[str, Tensor]) -> Actor:
         """Rebuilds the actor from the weights of a whole policy (``Checkpoint.policy``)."""
-        prefix = "mlp_extractor.actor."
-        matrices = [v for k, v in weights.items() if k.startswith(prefix) and v.ndim == 2]
-        hidden = tuple(len(matrix) for matrix in matrices)
-        network = ActorCriticNetwork(matrices[0].shape[1], 1, hidden)
-        output = nn.Linear(hidden[-1], len(weights["action_net.weight"]))
-        actor = cls(network.actor_normalizer, network.actor, output, low, high)
-        state = {"low": actor.low, "high": actor.high}
-        for name, prefix in (
-            ("normalizer", "mlp_extractor.actor_normalizer."),
-            ("hidden", "mlp_extractor.actor."),
-            ("output", "action_net."),
-        ):
-            for key, value in weights.items():
-                if key.startswith(prefix):
-                    state[f"{name}.{key.removeprefix(prefix)}"] = value
-        actor.load_state_dict(state)
-        return actor
+
+        def part(prefix: str) -> dict[str, Tensor]:
+            return {k.removeprefix(prefix): v for k, v in weights.items() if k.startswith(prefix)}
+
+        layers, last = part("mlp_extractor.actor."), part("action_net.")
+        matrices = [v for v in layers.values() if v.ndim == 2]
+        network = ActorCriticNetwork(matrices[0].shape[1], 1, tuple(map(len, matrices)))
+        network.actor_normalizer.load_state_dict(part("mlp_extractor.actor_normalizer."))
+        network.actor.load_state_dict(layers)
+        output = nn.Linear(last["weight"].shape[1], last["weight"].shape[0])
+        output.load_state_dict(last)
+        return cls(
+            network.actor_normalizer,
+            network.actor,
+            output,
+            weights["action_low"],
+            weights["action_high"],
+        )
+
+    @property
+    def observation_size(self) -> int:
+        """Length of the observation."""
+        return len(self.normalizer.mean)
 
     def forward(self, observation: Tensor) -> Tensor:
         """Returns the deterministic action (N, n), clipped to what the environment takes."""

@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 import torch
-from gymnasium import spaces
 
 from omni_envs.errors import FileFormatError, InvalidDataError
 from omni_envs.training.checkpoint import FOLDER, Checkpoint, checkpoints
@@ -27,7 +26,16 @@ class NetworkPolicy:
         self.actor = actor.eval()
 
     def __call__(self, observations: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """Returns the actions (N, n) for observations (N, ·)."""
+        """Returns the actions (N, n) for observations (N, ·).
+
+        Raises:
+            InvalidDataError: The observations have another length than those trained with.
+        """
+        size = self.actor.observation_size
+        if observations.shape[1:] != (size,):
+            raise InvalidDataError(
+                "Policy", "observations", f"(N, {size})", f"{observations.shape}"
+            )
         with torch.no_grad():
             return self.actor(torch.as_tensor(observations, dtype=torch.float32)).numpy()
 
@@ -44,24 +52,16 @@ def find_checkpoint(run: str | Path, which: Which = "last") -> Path:
     return found[-1 if which == "last" else 0]
 
 
-def load_actor(checkpoint: Path, action_space: spaces.Box, observation_size: int) -> Actor:
+def load_actor(checkpoint: Path) -> Actor:
     """Loads the actor of a checkpoint.
 
-    Args:
-        checkpoint: The file.
-        action_space: Bounds of the actions.
-        observation_size: Length of the observation that it must take.
-
     Raises:
-        FileFormatError: The file is missing or damaged.
-        InvalidDataError: The actor is for other observations or actions.
+        FileFormatError: The file is missing, damaged or holds another kind of network.
     """
     weights = Checkpoint.load(checkpoint).policy
-    actor = Actor.from_weights(weights, action_space.low, action_space.high)
-    sizes = (len(actor.normalizer.mean), actor.output.out_features)
-    expected = (observation_size, *action_space.shape)
-    if sizes != expected:
-        raise InvalidDataError(
-            str(checkpoint), "observation and action size", f"{expected}", f"{sizes}"
-        )
-    return actor
+    try:
+        return Actor.from_weights(weights).eval()
+    except (KeyError, IndexError, RuntimeError) as error:
+        raise FileFormatError(
+            checkpoint, "policy", "the weights of a TrackingPolicy", repr(error)
+        ) from error

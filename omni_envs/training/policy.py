@@ -10,6 +10,7 @@ from gymnasium import spaces
 from omni_envs.errors import InvalidDataError, MissingDependencyError
 
 try:
+    import torch
     from stable_baselines3.common.policies import ActorCriticPolicy
     from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
     from torch import nn
@@ -62,13 +63,19 @@ class TrackingPolicy(ActorCriticPolicy):
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = ActorCriticNetwork(*self._sizes, self._hidden)
+        # Kept with the weights, so that an actor can be rebuilt from them alone.
+        self.register_buffer("action_low", torch.as_tensor(self.action_space.low))
+        self.register_buffer("action_high", torch.as_tensor(self.action_space.high))
 
     def actor(self) -> Actor:
         """Returns the deterministic actor; it shares the weights of this policy."""
         network = self.mlp_extractor
-        space = self.action_space
         return Actor(
-            network.actor_normalizer, network.actor, self.action_net, space.low, space.high
+            network.actor_normalizer,
+            network.actor,
+            self.action_net,
+            self.action_low,
+            self.action_high,
         )
 
 

@@ -9,6 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 from gymnasium.vector import VectorEnv
 
+from omni_envs.progress import ProgressCallback
+
 BODY_ERROR, FRAME = "error/body_position", "frame"
 """Infos of the environment: distance of the tracked bodies from the re-aligned reference, root mean
 square over the bodies (N,), m; frame of the motion that is tracked next (N,)."""
@@ -46,6 +48,7 @@ def play(
     seed: int | None = None,
     options: Mapping[str, Any] | None = None,
     max_steps: int | None = None,
+    progress: ProgressCallback | None = None,
 ) -> Episodes:
     """Plays until every simulation has finished its first episode.
 
@@ -55,6 +58,7 @@ def play(
         seed: Seed of the reset.
         options: Options of the reset.
         max_steps: Control steps after which an episode counts as survived.
+        progress: Called with the number of finished episodes and of all.
     """
     n = env.num_envs
     lengths, alive = np.zeros(n, int), np.ones(n, bool)
@@ -69,4 +73,6 @@ def play(
         errors[alive] += infos[BODY_ERROR][alive]
         terminated |= alive & ended
         alive &= ~(ended | truncated)
+        if progress is not None:
+            progress(n - int(alive.sum()), n)
     return Episodes(lengths, returns, terminated, errors / lengths)

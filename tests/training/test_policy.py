@@ -76,5 +76,5 @@ def test_actor_is_rebuilt_from_saved_weights():
     policy = _policy(spaces.Dict({"policy": _box(4), "critic": _box(7)}))
     seen = {"policy": torch.randn(64, 4), "critic": torch.randn(64, 7)}
     policy.mlp_extractor.update_normalizers(seen)
-    rebuilt = Actor.from_weights(policy.state_dict(), ACTIONS.low, ACTIONS.high)
+    rebuilt = Actor.from_weights(policy.state_dict())
     assert torch.equal(rebuilt(seen["policy"]), policy.actor()(seen["policy"]))

@@ -1,0 +1,237 @@
+"""How good a policy is: success from motion start to end, and short windows all over the motion."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from omni_envs.progress import ProgressCallback
+from omni_envs.training.config import TrainConfig
+from omni_envs.training.rollout import Episodes, Policy, play
+from omni_envs.training.statistics import wilson_interval
+
+EVALUATION_FILE = "evaluation.json"
+WINDOW_SECONDS, WINDOWS = 3.0, 64
+UNCLIPPED = 1e3
+"""Action limit of environments that a policy file acts in: clipping is part of the file."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Figures of a policy; an episode runs from the motion's first frame to its end.
+
+    Attributes:
+        success_rate: Share of episodes that hit no termination criterion, under the evaluation
+            randomization.
+        success_ci95: Its 95 % confidence interval (Wilson).
+        episodes: Number of episodes.
+        episode_length_mean: Control steps.
+        episode_length_possible: Control steps of a whole motion.
+        return_mean: Undiscounted return per episode.
+        body_error_mean_m: Distance of the tracked bodies from the re-aligned reference, m.
+        window_survival_rate: Share of noise-free windows, spread evenly over the motion, that hit
+            no termination criterion.
+        window_seconds_mean: Mean time alive in a window, s.
+        window_body_error_mean_m: As ``body_error_mean_m``, in the windows.
+        windows: Number of windows.
+        window_seconds: Length of a window, s.
+        steps: Control steps that the policy was trained for.
+        seconds: Its training time.
+    """
+
+    success_rate: float
+    success_ci95: tuple[float, float]
+    episodes: int
+    episode_length_mean: float
+    episode_length_possible: int
+    return_mean: float
+    body_error_mean_m: float
+    window_survival_rate: float
+    window_seconds_mean: float
+    window_body_error_mean_m: float
+    windows: int
+    window_seconds: float
+    steps: int
+    seconds: float
+
+    def save(self, run: str | Path) -> Path:
+        """Writes ``evaluation.json`` into a run directory."""
+        path = Path(run) / EVALUATION_FILE
+        path.write_text(json.dumps(asdict(self), indent=2, allow_nan=False) + "\n")
+        return path
+
+
+def evaluation_options(
+    options: Mapping[str, Any], *, randomized: bool = True, file: bool = False
+) -> dict[str, Any]:
+    """Returns environment options for evaluating a policy that was trained with ``options``.
+
+    Episodes start at the motion's first frame and last to its end, the object counts from the
+    first step, physics are the default ones.
+
+    Args:
+        options: Options of the training environment.
+        randomized: With the randomization, the noise and the pushes of training, or without any.
+        file: For a policy file, whose actions are standard ones whatever it was trained as.
+    """
+    changes: dict[str, Any] = {
+        "physics": "default",
+        "reset": {"start": "start"},
+        "observation": {"privileged": False},
+        "termination": {"max_seconds": None, "object_after": 0.0},
+    }
+    if not randomized:
+        changes["reset"]["noise"] = changes["observation"]["noise"] = None
+        changes["randomization"] = {
+            "torso_centre_of_mass": None,
+            "joint_default": 0.0,
+            "friction": None,
+            "push": None,
+            "object": None,
+        }
+    if file:
+        changes["action"] = {"mode": "default", "limit": UNCLIPPED}
+    result = dict(options)
+    for name, change in changes.items():
+        old = result.get(name)
+        if isinstance(change, dict) and isinstance(old, Mapping):
+            change = {**old, **change}
+        result[name] = change
+    return result
+
+
+def make_evaluation_env(config: TrainConfig, num_envs: int, **kind: bool) -> VectorEnv:
+    """Makes the environment that policies of a run are evaluated in; see ``evaluation_options``."""
+    return gym.make_vec(
+        config.env,
+        num_envs=num_envs,
+        vectorization_mode="vector_entry_point",
+        num_threads=config.num_threads,
+        **evaluation_options(config.env_options, **kind),
+    )
+
+
+def play_windows(
+    env: VectorEnv, policy: Policy, frames: int, seconds: float = WINDOW_SECONDS
+) -> tuple[Episodes, float]:
+    """Plays one window per simulation, start frames spread evenly over the motion.
+
+    Args:
+        env: Environment of one motion, best without randomization.
+        policy: Who acts.
+        frames: Frames of the motion.
+        seconds: Length of a window; a shorter motion is one window.
+
+    Returns:
+        The windows as episodes, and their length in s.
+    """
+    dt = env.unwrapped.control_step  # type: ignore[attr-defined]
+    steps = min(round(seconds / dt), frames - 1)
+    start = np.linspace(0, frames - 1 - steps, env.num_envs).round().astype(int)
+    options = {"motion": np.zeros(env.num_envs, int), "frame": start}
+    return play(env, policy, seed=0, options=options, max_steps=steps), steps * dt
+
+
+def evaluate(
+    config: TrainConfig,
+    policy: Policy,
+    *,
+    file: bool = False,
+    steps: int = 0,
+    seconds: float = 0.0,
+    seed: int = 1_000_003,
+    progress: ProgressCallback | None = None,
+) -> Evaluation:
+    """Evaluates a policy without exploration.
+
+    Args:
+        config: The run that it belongs to.
+        policy: Who acts.
+        file: Whether it is a policy file (``OnnxPolicy``) instead of the network.
+        steps: Control steps that it was trained for, for the record.
+        seconds: Training time, for the record.
+        seed: Seed of the episodes.
+        progress: Called with the number of finished episodes and of all.
+    """
+    env = make_evaluation_env(config, config.evaluation_episodes, file=file)
+    try:
+        whole = play(env, policy, seed=seed, progress=progress)
+        references = env.unwrapped.references  # type: ignore[attr-defined]
+    finally:
+        env.close()
+    frames = references[0].num_frames
+    env = make_evaluation_env(config, WINDOWS, randomized=False, file=file)
+    try:
+        windows, window_seconds = play_windows(env, policy, frames)
+        dt = env.unwrapped.control_step  # type: ignore[attr-defined]
+    finally:
+        env.close()
+    successes = int((~whole.terminated).sum())
+    return Evaluation(
+        success_rate=successes / len(whole.lengths),
+        success_ci95=wilson_interval(successes, len(whole.lengths)),
+        episodes=len(whole.lengths),
+        episode_length_mean=float(whole.lengths.mean()),
+        episode_length_possible=max(r.num_frames for r in references) - 1,
+        return_mean=float(whole.returns.mean()),
+        body_error_mean_m=_weighted(whole),
+        window_survival_rate=float((~windows.terminated).mean()),
+        window_seconds_mean=float(windows.lengths.mean() * dt),
+        window_body_error_mean_m=_weighted(windows),
+        windows=len(windows.lengths),
+        window_seconds=window_seconds,
+        steps=steps,
+        seconds=seconds,
+    )
+
+
+def _weighted(episodes: Episodes) -> float:
+    """Mean error over all control steps."""
+    return float((episodes.body_error * episodes.lengths).sum() / episodes.lengths.sum())
+
+
+def evaluate_run(
+    run: str | Path,
+    *,
+    which: Literal["first", "last"] = "last",
+    file: str | Path | None = None,
+    episodes: int | None = None,
+    progress: ProgressCallback | None = None,
+) -> Evaluation:
+    """Evaluates the policy of a run directory.
+
+    Args:
+        run: Run directory.
+        which: ``"last"`` checkpoint or ``"first"``, the untrained policy.
+        file: A policy file to evaluate instead, e.g. ``RUN/policy.onnx``.
+        episodes: Number of episodes, by default that of the run's configuration.
+        progress: Called with the number of finished episodes and of all.
+
+    Raises:
+        FileFormatError: Configuration, checkpoint or policy file is missing or damaged.
+    """
+    from omni_envs.training.checkpoint import Checkpoint
+    from omni_envs.training.network_policy import NetworkPolicy, find_checkpoint, load_actor
+    from omni_envs.training.onnx_policy import OnnxPolicy
+
+    config = TrainConfig.load(run)
+    if episodes is not None:
+        config = replace(config, evaluation_episodes=episodes)
+    path = find_checkpoint(run, which)
+    state = Checkpoint.load(path)
+    policy: Policy = NetworkPolicy(load_actor(path)) if file is None else OnnxPolicy(file)
+    return evaluate(
+        config,
+        policy,
+        file=file is not None,
+        steps=state.steps,
+        seconds=state.seconds,
+        progress=progress,
+    )

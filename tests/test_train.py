@@ -1,0 +1,114 @@
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("onnxruntime")
+pytest.importorskip("matplotlib")
+
+from omni_envs.export import export_run
+from omni_envs.references import reference_from_qpos
+from omni_envs.robots import G1
+from omni_envs.training.evaluate import evaluate_run
+from omni_envs.training.onnx_policy import OnnxPolicy
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+import train
+
+KEYS = {
+    "success_rate", "success_ci95", "episode_length_mean", "body_error_mean_m", "steps", "seconds",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory) -> Path:
+    """The G1 bending its knees, without object."""
+    qpos = np.tile(G1.default_qpos, (30, 1))
+    wave = 0.2 * (1 - np.cos(np.linspace(0, np.pi, 30)))
+    for i, name in enumerate(G1.joint_names):
+        if "knee" in name:
+            qpos[:, 7 + i] += wave
+    path = tmp_path_factory.mktemp("reference") / "bend.npz"
+    return reference_from_qpos(G1, 50.0, qpos).save(path)
+
+
+def _words(out: Path, reference: Path, *more: str) -> list[str]:
+    options = json.dumps({"reference": str(reference), "action": {"mode": "residual"}})
+    ppo = json.dumps({"hidden": [16], "rollout_steps": 8, "epochs": 1})
+    return [
+        "--steps", "64", "--out", str(out), "--num-envs", "4", "--num-threads", "1",
+        "--episodes", "5", "--env-options", options, "--ppo", ppo, *more,
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(reference, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("run") / "bend"
+    assert train.main(_words(out, reference, "--json")) == 0
+    return out
+
+
+def test_trains_evaluates_and_exports(run):
+    for name in (
+        "config.json", "checkpoints", "tensorboard", "evaluation.json", "policy.onnx",
+        "policy.json", "curve.png", "curve.csv",
+    ):  # fmt: skip
+        assert (run / name).exists(), name
+    evaluation = json.loads((run / "evaluation.json").read_text())
+    assert set(evaluation) >= KEYS
+    assert evaluation["steps"] == 64 and evaluation["episodes"] == 5
+    low, high = evaluation["success_ci95"]
+    assert 0 <= low <= evaluation["success_rate"] <= high <= 1
+    sidecar = json.loads((run / "policy.json").read_text())
+    assert sidecar["checks"]["parity_max_abs"] <= 1e-5
+    assert sidecar["checks"]["closed_loop_return"] == pytest.approx(
+        sidecar["checks"]["closed_loop_return_network"], rel=1e-3
+    )
+
+
+def test_file_and_network_get_the_same_evaluation(run):
+    network, file = evaluate_run(run), evaluate_run(run, file=run / "policy.onnx")
+    assert file.episode_length_mean == network.episode_length_mean
+    assert file.return_mean == pytest.approx(network.return_mean, rel=1e-3)
+    assert file.body_error_mean_m == pytest.approx(network.body_error_mean_m, rel=1e-3)
+    assert file.window_seconds_mean == network.window_seconds_mean
+
+
+def test_export_goes_where_it_is_told(run, tmp_path):
+    rows = export_run(run, out=tmp_path / "other.onnx")
+    assert rows["path"] == str(tmp_path / "other.onnx")
+    assert OnnxPolicy(rows["path"]).metadata["run_path"] == str(run)
+    assert json.loads(Path(rows["sidecar"]).read_text())["observation"]["size"] == 160
+
+
+def test_resumes_and_shows_a_table(run, reference, capsys):
+    words = ["--steps", "96", "--out", str(run), "--resume", "--episodes", "5"]
+    assert train.main(words) == 0
+    shown = capsys.readouterr()
+    assert "success_rate" in shown.out and "steps/s" in shown.err
+    assert json.loads((run / "evaluation.json").read_text())["steps"] == 96
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--env-options", "{"), "--env-options: expected JSON"),
+        (("--ppo", "[1]"), "--ppo: expected a JSON object"),
+        (("--ppo", '{"gama": 1}'), "unknown ['gama']"),
+        (("--env-options", '{"rewards": {}}'), "rewards"),
+        (("--resume",), "config.json"),
+        (("--steps", "0"), "steps must be positive"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_1(tmp_path, reference, capsys, more, message):
+    assert train.main(_words(tmp_path / "new", reference, *more)) == 1
+    error = capsys.readouterr().err.strip()
+    assert message in error and error.startswith("train.py: ") and "\n" not in error
+
+
+def test_a_used_run_directory_is_refused(run, reference, capsys):
+    assert train.main(_words(run, reference)) == 1
+    assert "already holds a training run" in capsys.readouterr().err

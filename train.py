@@ -1,0 +1,164 @@
+"""Train a policy, evaluate it, export it: ``python train.py --env ID --steps N --out RUN``."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+import omni_envs  # noqa: F401  (registers the environments)
+from omni_envs.errors import InvalidOptionError, MissingDependencyError, OmniEnvsError
+from omni_envs.progress import progress_bar
+from omni_envs.training.config import TrainConfig
+from omni_envs.training.recipes import RECIPES
+
+
+@dataclass
+class Arguments:
+    """Train a policy, evaluate it, export it."""
+
+    steps: int
+    """Control steps to train for, all simulations together."""
+
+    out: Path
+    """Run directory."""
+
+    env: str = "OmniEnvs/G1BoxCarry-v0"
+    """Environment id."""
+
+    trainer: Literal["sb3"] = "sb3"
+    """Library that trains."""
+
+    recipe: Literal["small", "published"] = "small"
+    """Settings to start from."""
+
+    num_envs: int = 256
+    """Simulations."""
+
+    num_threads: int = 0
+    """Physics threads; 0 takes every core."""
+
+    seed: int = 0
+    """Seed of network, exploration and environment."""
+
+    resume: bool = False
+    """Go on from the last checkpoint in the run directory, with the settings saved there."""
+
+    time_limit: float = 0.0
+    """Seconds of training, earlier parts included, after which it ends anyway; 0 = no limit."""
+
+    episodes: int = 100
+    """Episodes of the evaluation."""
+
+    env_options: str = "{}"
+    """Options of the environment as JSON, over those of the recipe."""
+
+    ppo: str = "{}"
+    """Hyper-parameters as JSON, over those of the recipe."""
+
+    json: bool = False
+    """Print JSON."""
+
+
+def make_config(arguments: Arguments) -> TrainConfig:
+    """Builds the configuration of a new run, or changes that of the run to resume."""
+    ends: dict[str, Any] = {
+        "steps": arguments.steps,
+        "time_limit": arguments.time_limit,
+        "evaluation_episodes": arguments.episodes,
+    }
+    if arguments.resume:
+        config = TrainConfig.load(arguments.out)
+        if config.env != arguments.env:
+            raise InvalidOptionError(
+                f"{arguments.out} is a run on {config.env}: --env must say so."
+            )
+        return replace(config, **ends)
+    recipe = RECIPES[arguments.recipe]
+    data = {
+        "env": arguments.env,
+        "out": arguments.out,
+        "trainer": arguments.trainer,
+        "num_envs": arguments.num_envs,
+        "num_threads": arguments.num_threads,
+        "seed": arguments.seed,
+        "env_options": {**recipe.env_options, **_mapping("--env-options", arguments.env_options)},
+        "ppo": {**asdict(recipe.ppo), **_mapping("--ppo", arguments.ppo)},
+        **ends,
+    }
+    return TrainConfig.from_dict(data)
+
+
+def run(arguments: Arguments) -> dict[str, Any]:
+    """Trains, evaluates and exports; returns the figures."""
+    _check_packages()
+    from omni_envs.export import export_run
+    from omni_envs.training.curve import plot_curve
+    from omni_envs.training.evaluate import evaluate_run
+    from omni_envs.training.run import train
+
+    config = make_config(arguments)
+    result = train(config, resume=arguments.resume, progress=not arguments.json)
+    plot_curve(config.out, result.history, result.control_dt)
+    with progress_bar("Evaluating", unit="episodes", disable=arguments.json) as progress:
+        evaluation = evaluate_run(config.out, progress=progress)
+    evaluation.save(config.out)
+    exported = export_run(config.out)
+    return {**asdict(evaluation), **exported, "out": str(config.out)}
+
+
+def _mapping(flag: str, text: str) -> dict[str, Any]:
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise InvalidOptionError(f"{flag}: expected JSON; got {text!r} ({error}).") from error
+    if not isinstance(data, dict):
+        raise InvalidOptionError(f"{flag}: expected a JSON object; got {text!r}.")
+    return data
+
+
+def _check_packages() -> None:
+    """Fails before the training, not after it."""
+    for package, extra, purpose in (
+        ("stable_baselines3", "sb3", "Training with SB3"),
+        ("tensorboard", "sb3", "The TensorBoard log"),
+        ("onnx", "export", "Exporting a policy"),
+        ("onnxruntime", "export", "Checking an exported policy"),
+        ("matplotlib", "viewer", "Drawing the learning curve"),
+    ):
+        if importlib.util.find_spec(package) is None:
+            raise MissingDependencyError(package, extra, purpose)
+
+
+def main(words: list[str] | None = None) -> int:
+    """Runs the command; returns 0 done, 1 could not do what was asked (2: wrong usage)."""
+    arguments = tyro.cli(Arguments, prog="train.py", args=words)
+    try:
+        figures = run(arguments)
+    except OmniEnvsError as error:
+        print(f"train.py: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("train.py: interrupted; --resume goes on from the last checkpoint", file=sys.stderr)
+        return 1
+    if arguments.json:
+        print(json.dumps(figures, allow_nan=False))
+        return 0
+    table = Table(title=f"{arguments.out}", title_justify="left")
+    table.add_column("figure")
+    table.add_column("value", justify="right")
+    for name, value in figures.items():
+        table.add_row(name, f"{value:.4g}" if isinstance(value, float) else str(value))
+    Console().print(table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
