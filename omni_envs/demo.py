@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import shutil
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from omni_envs.training.evaluate import Evaluation
 
 ENV, ROBOT, DEMONSTRATION = "OmniEnvs/G1BoxCarry-v0", "g1", "box_carry"
-EPISODES = 64
+RECIPE, MOST_STEPS, EPISODES = "small", 10**9, 64
 PICTURES, COLUMNS = 12, 6
 
 _NEEDS = (
@@ -57,8 +56,9 @@ def run_demo(
         except ImportError as error:
             raise MissingDependencyError(package, extra, "The demo") from error
     from omni_envs.export import export_run
+    from omni_envs.training.config import TrainConfig
     from omni_envs.training.evaluate import evaluate_run
-    from omni_envs.training.recipes import quick_recipe
+    from omni_envs.training.recipes import RECIPES
     from omni_envs.training.run import train
 
     out = Path(out)
@@ -73,11 +73,16 @@ def run_demo(
     run = out / "run"
     if (run / "config.json").is_file():
         shutil.rmtree(run)
-    config = quick_recipe(ENV, run, minutes=minutes, seed=seed)
-    config = replace(
-        config,
-        env_options={**config.env_options, "reference": str(out / "reference.npz")},
+    recipe = RECIPES[RECIPE]
+    config = TrainConfig(
+        env=ENV,
+        out=run,
+        steps=MOST_STEPS,
+        time_limit=60.0 * minutes,
+        seed=seed,
+        env_options={**recipe.env_options, "reference": str(out / "reference.npz")},
         evaluation_episodes=EPISODES,
+        ppo=recipe.ppo,
     )
     trained = train(config, progress=False if quiet else None)
 

@@ -63,6 +63,21 @@ class FileFormatError(OmniEnvsError, ValueError):
         super().__init__(f"{path}: {field}: expected {expected}; found {found}.")
 
 
+class RenderingError(OmniEnvsError, RuntimeError):
+    """No picture can be made on this machine.
+
+    Args:
+        reason: What the graphics library said.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(
+            f"Offscreen rendering does not work here: {reason} Without a display MuJoCo needs EGL "
+            "or OSMesa (Debian: apt-get install libegl1) and MUJOCO_GL=egl or osmesa before it is "
+            "imported; importing omni_envs first sets it."
+        )
+
+
 class MissingDependencyError(OmniEnvsError, ImportError):
     """An optional package that is not installed.
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-# Without a display GLFW aborts the interpreter; EGL renders headless. MuJoCo reads this at import.
-if sys.platform == "linux" and "DISPLAY" not in os.environ:
-    os.environ.setdefault("MUJOCO_GL", "egl")
 
 import mujoco
 import numpy as np
 
+from omni_envs.errors import RenderingError
 from omni_envs.robots import Robot
 from omni_envs.scenes.build import LOOKS, OBJECT, PHYSICS_ONLY, build_spec
 from omni_envs.scenes.scene import Scene
@@ -52,6 +47,9 @@ class SceneRenderer:
         ghosts: How many ghosts can be shown at once.
         width: Pixels.
         height: Pixels.
+
+    Raises:
+        RenderingError: There is no graphics context to be had.
     """
 
     def __init__(
@@ -68,7 +66,10 @@ class SceneRenderer:
         self._ghost_model.geom_matid[:] = -1
         self._ghost_model.geom_rgba[:] = _GHOST_RGBA
         self._ghosts = [mujoco.MjData(self._ghost_model) for _ in range(ghosts)]
-        self._renderer = mujoco.Renderer(self._model, height, width, max_geom=4000)
+        try:
+            self._renderer = mujoco.Renderer(self._model, height, width, max_geom=4000)
+        except Exception as error:  # every GL backend has its own exception classes
+            raise RenderingError(f"{type(error).__name__}: {error}.") from error
         self._option = mujoco.MjvOption()
         mujoco.mjv_defaultOption(self._option)
         self._option.geomgroup[:] = 0
