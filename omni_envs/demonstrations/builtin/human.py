@@ -1,8 +1,8 @@
 """A human body of average proportions, posed from pelvis, chest, feet and hands in closed form.
 
-Segment lengths follow the drawn-up averages of Drillis and Contini (as fractions of the standing
-height) with the spine divided as in SMPL; segment masses follow de Leva (1996). Legs and arms are
-solved as two links in closed form, so planted feet and grasping hands are exact.
+Segment lengths are those of SMPL's average body to a few centimetres, with the ankle at the upper
+end of the ankle joint; segment masses follow de Leva (1996). Legs and arms are solved as two links
+in closed form, so planted feet and grasping hands are exact.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ HEIGHT = 1.72
 MASS = 70.0
 
 HIP = (0.0, 0.085, -0.08)  # from the pelvis joint, left side
-THIGH, SHIN = 0.422, 0.422
-ANKLE_FROM_TOE = np.array([-0.135, 0.0, 0.06])  # flat foot pointing along +x
+THIGH, SHIN = 0.395, 0.36
+ANKLE_FROM_TOE = np.array([-0.135, 0.0, 0.075])  # flat foot pointing along +x
 HEEL_FROM_TOE = np.array([-0.185, 0.0, -0.02])
-TOE_TIP = 0.065
-SPINE = (0.10, 0.13, 0.07, 0.21)  # pelvis – torso – spine – chest – neck
-COLLAR = np.array([-0.01, 0.07, 0.13])  # from the chest joint, left side
-SHOULDER = np.array([0.0, 0.175, 0.12])
-NECK_TO_HEAD = 0.09
+TOES_FROM_TOE = np.array([0.045, 0.0, -0.01])
+SPINE = (0.10, 0.13, 0.07, 0.20)  # pelvis – torso – spine – chest – neck
+COLLAR = np.array([-0.01, 0.07, 0.11])  # from the chest joint, left side
+SHOULDER = np.array([0.0, 0.175, 0.10])
+NECK_TO_HEAD = 0.10
 UPPER_ARM, FOREARM = 0.285, 0.25
 PALM, PALM_DEPTH, FINGER = 0.085, 0.025, 0.17
 
@@ -35,9 +35,11 @@ JOINTS = (
     *("Torso", "Spine", "Chest", "Neck", "Head"),
     *("L_Thorax", "L_Shoulder", "L_Elbow", "L_Wrist"),
     *("R_Thorax", "R_Shoulder", "R_Elbow", "R_Wrist"),
-    *("L_Heel", "L_Palm", "L_Fingers", "R_Heel", "R_Palm", "R_Fingers"),
+    *("L_Heel", "L_Toes", "L_Palm", "L_Fingers", "R_Heel", "R_Toes", "R_Palm", "R_Fingers"),
 )
-"""The 22 body joints in SMPL-H order, then the heels, the skin of the palms and the fingertips."""
+"""The 22 body joints in SMPL-H order, then heels, toes, the skin of the palms and fingertips.
+
+``Toe`` is the joint at the ball of the foot, ``Toes`` the middle of the big toe."""
 
 # (from joint, to joint, centre along the segment, share of the body mass)
 _SEGMENTS = (
@@ -144,12 +146,14 @@ def torso(
 
 
 def add_legs(joints: dict[str, np.ndarray], feet: Feet, knees_out: np.ndarray) -> None:
-    """Adds knees, ankles, toes and heels; ``knees_out`` (T,) turns the knees outward, rad."""
+    """Adds knees, ankles, heels and toes; ``knees_out`` (T,) turns the knees outward, rad."""
     for i, (side, sign) in enumerate((("L", 1.0), ("R", -1.0))):
         frame = turn(feet.yaw[:, i], feet.pitch[:, i])
         toe = feet.toes[:, i]
         joints[f"{side}_Toe"] = toe
         joints[f"{side}_Heel"] = toe + frame @ HEEL_FROM_TOE
+        toes = turn(feet.yaw[:, i], feet.pitch[:, i] * feet.share[:, i])
+        joints[f"{side}_Toes"] = toe + toes @ TOES_FROM_TOE
         ankle = joints[f"{side}_Ankle"] = toe + frame @ ANKLE_FROM_TOE
         forward = turn(feet.yaw[:, i] + sign * knees_out)[..., 0]
         joints[f"{side}_Knee"] = two_links(joints[f"{side}_Hip"], ankle, (THIGH, SHIN), forward)
@@ -188,7 +192,7 @@ SKELETON = Skeleton(
                 ("hip", "Hip"),
                 ("knee", "Knee"),
                 ("ankle", "Ankle"),
-                ("toe", "Toe"),
+                ("toe", "Toes"),  # like the tip of a robot's rigid foot
                 ("shoulder", "Shoulder"),
                 ("elbow", "Elbow"),
                 ("hand", "Wrist"),
@@ -200,7 +204,7 @@ SKELETON = Skeleton(
         for side in SIDES
         for link, joints in (
             ("hand", ("Palm", "Fingers")),
-            ("foot", ("Toe", "Heel")),
+            ("foot", ("Toes", "Heel")),
             ("knee", ("Knee",)),
         )
     },

@@ -52,7 +52,7 @@ class Step:
     land: float
     ball: tuple[float, float]
     yaw: float
-    heel_off: float = 0.35
+    heel_off: float = 0.30
     heel_strike: float = 0.14
 
 
