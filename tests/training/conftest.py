@@ -36,7 +36,7 @@ class Chase(VectorEnv):
         self.position = np.zeros((self.num_envs, DIMENSIONS))
         self.time = np.zeros(self.num_envs, int)
         self._place(np.ones(self.num_envs, bool))
-        return self._observe(), {}
+        return self._observe(), {"frame": self.time.copy()}
 
     def step(self, actions: np.ndarray):
         assert self.action_space.contains(np.asarray(actions, np.float32))
@@ -55,6 +55,7 @@ class Chase(VectorEnv):
                 "_error/body_position": done,
             }
             self._place(done)
+        infos["frame"] = self.time.copy()
         return self._observe(), reward, terminated, truncated, infos
 
     def _place(self, mask: np.ndarray) -> None:

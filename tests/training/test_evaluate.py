@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from omni_envs.envs import OmniVectorEnv
+from omni_envs.references import Reference, reference_from_qpos
+from omni_envs.robots import G1
+from omni_envs.training.evaluate import evaluation_options, play_windows
+from omni_envs.tracking import make_config
+
+
+@pytest.fixture(scope="module")
+def standing() -> Reference:
+    return reference_from_qpos(G1, 50.0, np.tile(G1.default_qpos, (40, 1)))
+
+
+def test_options_of_training_are_kept_but_for_what_evaluation_fixes():
+    trained = {
+        "preset": "beyondmimic",
+        "physics": "fast",
+        "observation": {"privileged": True, "state_estimation": False},
+        "action": {"mode": "residual", "scale": 2.0},
+        "reset": {"start": "adaptive", "noise": {"joint_position": 0.2}},
+    }
+    config = make_config(**evaluation_options(trained))
+    assert config.physics.timestep == 0.005
+    assert not config.observation.privileged and not config.observation.state_estimation
+    assert config.reset.start == "start" and config.reset.noise.joint_position == 0.2
+    assert config.termination.max_seconds is None and config.termination.object_after == 0.0
+    assert config.action.mode == "residual" and config.anchor == "torso"
+    assert trained["observation"] == {"privileged": True, "state_estimation": False}
+
+
+def test_without_randomization_nothing_is_left_to_chance(standing):
+    options = evaluation_options({"reference": standing}, randomized=False)
+    returns = []
+    for seed in (1, 2):
+        env = OmniVectorEnv(2, num_threads=1, **options)
+        observation, _ = env.reset(seed=seed)
+        total = 0.0
+        for _ in range(15):
+            observation, reward, *_ = env.step(np.zeros((2, 29)))
+            total = total + reward
+        returns.append((observation, total))
+    np.testing.assert_array_equal(returns[0][0], returns[1][0])
+    np.testing.assert_array_equal(returns[0][1], returns[1][1])
+
+
+def test_a_file_acts_with_standard_actions_that_only_itself_clips():
+    config = make_config(
+        **evaluation_options({"action": {"mode": "residual", "scale": 2.0}}, file=True)
+    )
+    assert config.action.mode == "default" and config.action.scale == 2.0
+    assert config.action.limit >= 100
+
+
+def test_windows_are_spread_evenly_over_the_motion(standing):
+    options = evaluation_options({"reference": standing}, randomized=False)
+    env = OmniVectorEnv(4, num_threads=1, **options)
+    seen = []
+
+    def policy(observations, frames):
+        seen.append(frames.copy())
+        return np.zeros((4, 29))
+
+    windows, seconds = play_windows(env, policy, 40, seconds=0.2)
+    assert seconds == pytest.approx(0.2) and (windows.lengths == 10).all()
+    # an episode that starts in frame k tracks frame k + 1 first
+    np.testing.assert_array_equal(seen[0], np.array([0, 10, 19, 29]) + 1)
+    np.testing.assert_array_equal(seen[-1], np.array([0, 10, 19, 29]) + 10)
+
+
+def test_a_short_motion_is_one_window(standing):
+    env = OmniVectorEnv(
+        2, num_threads=1, **evaluation_options({"reference": standing}, randomized=False)
+    )
+    windows, seconds = play_windows(env, lambda o, f: np.zeros((2, 29)), 40, seconds=3.0)
+    assert seconds == pytest.approx(39 * 0.02)
+    assert (windows.lengths <= 39).all()
