@@ -4,8 +4,8 @@ import pytest
 from omni_envs.envs import OmniVectorEnv
 from omni_envs.references import Reference, reference_from_qpos
 from omni_envs.robots import G1
-from omni_envs.training.evaluate import evaluation_options, play_windows
 from omni_envs.tracking import make_config
+from omni_envs.training.evaluate import evaluation_options, play_windows
 
 
 @pytest.fixture(scope="module")
