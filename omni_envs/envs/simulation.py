@@ -61,10 +61,10 @@ class Simulation:
         self.ctrl, self._warmstart = self.batch.bind("ctrl"), self.batch.bind("qacc_warmstart")
         self._history = self.batch.bind("history")
         self._kinematics = BodyKinematics(robot, num, threads)
-        self._variants, self._fields = variants, variants.expand(self.batch)
+        self._variants, self._fields = variants, variants.attach(self.batch)
         self.variant = np.zeros(num, int)
         self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
-        self._copy_variants(np.arange(num))
+        self._use_variants(np.arange(num))
 
     def step(self) -> np.ndarray:
         """Advances every simulation by a control step under ``ctrl``.
@@ -95,7 +95,7 @@ class Simulation:
         """
         self.batch.reset(ids, stage=_NOTHING)
         self.variant[ids] = variant
-        self._copy_variants(ids)
+        self._use_variants(ids)
         self.qpos[ids], self.qvel[ids] = qpos, qvel
         self._kinematics.update(self.qpos, self.qvel, ids)
 
@@ -121,7 +121,11 @@ class Simulation:
         """Gives another batch of N simulations the randomized models of these."""
         for name, live in self._fields.items():
             other.expand(name)[:] = live
+        if self._variants.models:
+            other.set_models([self._variants.models[v] for v in self.variant])
 
-    def _copy_variants(self, ids: np.ndarray) -> None:
+    def _use_variants(self, ids: np.ndarray) -> None:
         for name, values in self._variants.fields.items():
             self._fields[name][ids] = values[self.variant[ids]]
+        if self._variants.models:
+            self.batch.set_models([self._variants.models[v] for v in self.variant])

@@ -1,8 +1,9 @@
-"""Randomized models: drawn and completed once, handed to episodes by copying fields."""
+"""Randomized models: drawn and completed once, handed to episodes when they start."""
 
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -15,27 +16,32 @@ from omni_envs.tracking.config import ObjectRandomization, RandomizationConfig
 from omni_envs.tracking.randomization import scaled_inertia, symmetric
 
 SEED = 20260101
-"""The variants are the same in every environment; which one an episode gets comes from its own seed."""
+"""Variants are the same in every environment; which one an episode gets comes from its own seed."""
+
+Compile = Callable[[SceneObject], mujoco.MjModel]
 
 
 class ModelVariants:
     """A pool of randomized models of one layout.
 
-    Completing a randomized model (``mj_setConst``) costs as much as several control steps, so a pool of
-    them is made once, and an episode that starts gets a variant's fields copied into its simulation.
+    Completing a randomized model (``mj_setConst``) costs as much as several control steps, so a
+    pool of them is made once. An episode that starts gets a variant: the fields in which variants
+    differ are copied into its simulation, or, where meshes differ, it runs on the variant's model.
 
     Attributes:
         count: Number of variants.
         fields: Model field to (count, …) values, for the fields in which the variants differ.
+        models: The variants themselves where their meshes differ, else empty.
 
     Args:
         model: The model without randomization.
         robot: The robot in it.
         scene_object: The object in it, if any.
         config: What to randomize.
+        compile_with: Compiles the model with another object, for objects that are meshes.
 
     Raises:
-        InvalidOptionError: Shape randomization of an object that is not made of boxes.
+        InvalidOptionError: There would be no variant.
     """
 
     def __init__(
@@ -44,17 +50,26 @@ class ModelVariants:
         robot: Robot,
         scene_object: SceneObject | None,
         config: RandomizationConfig,
+        compile_with: Compile,
     ) -> None:
-        rng = np.random.default_rng(SEED)
-        objects = config.object if scene_object is not None else None
-        active = config.torso_centre_of_mass or config.friction or objects
-        self.count = config.variants if active else 1
-        if self.count < 1:
+        if config.variants < 1:
             raise InvalidOptionError("randomization.variants must be at least 1.")
+        self.count, self.fields, self.models = 1, {}, ()
+        objects = config.object if scene_object is not None else None
+        if not (config.torso_centre_of_mass or config.friction or objects):
+            return
+        rng = np.random.default_rng(SEED)
+        meshes = scene_object is not None and not all(
+            isinstance(p.shape, Box) for p in scene_object.parts
+        )
         data = mujoco.MjData(model)
         variants = []
-        for _ in range(self.count if active else 0):
-            variant = copy.copy(model)
+        for _ in range(config.variants):
+            if objects is not None and objects.shape and meshes and scene_object is not None:
+                scale = 1.0 + objects.shape * (2.0 * rng.random() - 1.0)
+                variant = compile_with(scene_object.scaled(scale))
+            else:
+                variant = copy.copy(model)
             if config.torso_centre_of_mass is not None:
                 torso = variant.body(robot.torso_body).id
                 variant.body_ipos[torso] += symmetric(rng, 1, config.torso_centre_of_mass)[0]
@@ -62,60 +77,31 @@ class ModelVariants:
                 geoms = [g for g in range(model.ngeom) if _body(model, g) in robot.body_names]
                 variant.geom_friction[geoms, 0] = rng.uniform(*config.friction)
             if objects is not None and scene_object is not None:
-                _randomize_object(variant, scene_object, objects, rng)
+                share = 0.0 if meshes else objects.shape
+                scale = _scale_boxes(variant, scene_object, share, rng)
+                _randomize_mass(variant, scale, objects, rng)
             mujoco.mj_setConst(variant, data)
             variants.append(variant)
-        self.fields = {} if not variants else _differing_fields(model, variants)
+        self.count = len(variants)
+        if meshes and objects is not None and objects.shape:
+            self.models = tuple(variants)
+        else:
+            self.fields = _differing_fields(model, variants)
 
-    def expand(self, simulations: batch.Batch) -> dict[str, np.ndarray]:
+    def attach(self, simulations: batch.Batch) -> dict[str, np.ndarray]:
         """Gives every differing field one value per simulation; returns the live arrays."""
         live = {name: simulations.expand(name) for name in self.fields}
-        # Of the bounding volumes only those of bodies can differ, not those inside meshes after them.
-        self.fields = {
-            name: values[:, : live[name].shape[1]] for name, values in self.fields.items()
-        }
+        # Of the bounding volumes only those of bodies can differ, not those inside meshes.
+        self.fields = {name: v[:, : live[name].shape[1]] for name, v in self.fields.items()}
         return live
 
 
-def _randomize_object(
-    model: mujoco.MjModel,
-    scene_object: SceneObject,
-    config: ObjectRandomization,
-    rng: np.random.Generator,
-) -> None:
-    body = model.body(OBJECT).id
-    scale = np.ones(3)
-    if config.shape:
-        scale = _scale_geoms(model, scene_object, config.shape, rng)
-    rotation = np.empty(9)
-    mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
-    rotation = rotation.reshape(3, 3)
-    inertia = rotation @ np.diag(model.body_inertia[body]) @ rotation.T
-    inertia = scaled_inertia(inertia, scale)
-    model.body_ipos[body] *= scale
-    if config.mass is not None:
-        mass = rng.uniform(*config.mass)
-        inertia *= mass / model.body_mass[body]
-        model.body_mass[body] = mass
-    if config.inertia is not None:
-        inertia *= rng.uniform(*config.inertia)
-    principal, axes = np.linalg.eigh(inertia)
-    axes[:, 2] *= np.sign(np.linalg.det(axes))
-    model.body_inertia[body] = principal
-    mujoco.mju_mat2Quat(model.body_iquat[body], axes.ravel())
-    if config.centre_of_mass:
-        model.body_ipos[body] += symmetric(rng, 1, [config.centre_of_mass] * 3)[0]
-
-
-def _scale_geoms(
+def _scale_boxes(
     model: mujoco.MjModel, scene_object: SceneObject, share: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Scales the object's boxes; returns the (3,) factors in the object's axes."""
-    if not all(isinstance(p.shape, Box) for p in scene_object.parts):
-        raise InvalidOptionError(
-            "randomization.object.shape: only objects made of boxes change shape; set it to 0 for "
-            f"{scene_object.name!r}."
-        )
+    """Scales the object's boxes by 1 ± share; returns the (3,) factors in the object's axes."""
+    if not share:
+        return np.ones(3)
     # Turned boxes would shear under a factor per axis.
     upright = all(np.allclose(p.quaternion, (1, 0, 0, 0)) for p in scene_object.parts)
     draws = 1.0 + share * (2.0 * rng.random(3) - 1.0)
@@ -128,6 +114,32 @@ def _scale_geoms(
         model.geom_rbound[geom] = np.linalg.norm(model.geom_size[geom])
         model.geom_aabb[geom, 3:] = model.geom_size[geom]
     return scale
+
+
+def _randomize_mass(
+    model: mujoco.MjModel,
+    scale: np.ndarray,
+    config: ObjectRandomization,
+    rng: np.random.Generator,
+) -> None:
+    """Sets mass, inertia and centre of mass of an object stretched by ``scale`` (3,)."""
+    body = model.body(OBJECT).id
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
+    principal = rotation.reshape(3, 3)
+    inertia = scaled_inertia(principal @ np.diag(model.body_inertia[body]) @ principal.T, scale)
+    model.body_ipos[body] *= scale
+    if config.mass is not None:
+        mass = rng.uniform(*config.mass)
+        inertia *= mass / model.body_mass[body]
+        model.body_mass[body] = mass
+    if config.inertia is not None:
+        inertia *= rng.uniform(*config.inertia)
+    model.body_inertia[body], axes = np.linalg.eigh(inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    mujoco.mju_mat2Quat(model.body_iquat[body], axes.ravel())
+    if config.centre_of_mass:
+        model.body_ipos[body] += symmetric(rng, 1, [config.centre_of_mass] * 3)[0]
 
 
 def _body(model: mujoco.MjModel, geom: int) -> str:

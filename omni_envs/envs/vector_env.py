@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -142,8 +143,13 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.scene = common_scene(self.references)
         self._task = TrackingTask(self.robot, config, self._library.has_object)
         env_model = build_model(self.robot, self.scene, config)
+        scene = self.scene
         self._variants = ModelVariants(
-            env_model.model, self.robot, self.scene.object, config.randomization
+            env_model.model,
+            self.robot,
+            scene.object,
+            config.randomization,
+            lambda o: build_model(self.robot, replace(scene, object=o), config).model,
         )
         self.simulation = Simulation(
             env_model, self.robot, self._variants, num_envs, config.physics.substeps, num_threads

@@ -200,7 +200,7 @@ class RandomizationConfig:
     friction: Range | None = None
     push: PushConfig | None = PushConfig()
     object: ObjectRandomization | None = ObjectRandomization()
-    variants: int = 256
+    variants: int = 128
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,8 @@ def _convert(hint: Any, value: Any, owner: str, current: Any) -> Any:
         (kind,) = (o for o in options if o is not type(None))
         return _convert(kind, value, owner, current)
     if dataclasses.is_dataclass(hint):
+        if value is None:
+            raise InvalidOptionError(f"{owner}: cannot be switched off.")
         start = current if current is not None else hint()  # type: ignore[operator]
         return override(start, value, owner)
     if origin is Literal:
