@@ -9,11 +9,13 @@ from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
+from pkgutil import iter_modules
 from time import perf_counter, process_time
 from typing import Any, TypeVar
 
 import numpy as np
 
+from omni_envs import retargeting
 from omni_envs.benchmarks.stages import StageSampler
 from omni_envs.demonstrations import (
     Demonstration,
@@ -31,17 +33,13 @@ STAGES = {
     "surface_points": "mesh",
     "kinematics": "kinematics",
     "contact_limit": "collision",
-    "interaction_mesh_task": "assembly",
-    "joint_limits": "assembly",
-    "proximal_task": "assembly",
-    "qp": "assembly",
-    "stance_limit": "assembly",
     "solver": "qp",
     "stance_plan": "footholds",
     "frame_solver": "loop",
     "retarget": "loop",
 }
-"""Module of ``omni_envs.retargeting`` to the stage its own time counts for."""
+"""Module of ``omni_envs.retargeting`` to the stage its own time counts for; the others, all tasks
+and limits, are ``"assembly"`` of the quadratic program."""
 
 WHOLE_STAGES = {"_restore": "restoration", "_sketch": "footholds"}
 """Functions whose whole time is one stage, callees included."""
@@ -180,8 +178,10 @@ def _stage_shares(
     motion: SourceMotion, robot: Robot, options: RetargetOptions | None, runs: int
 ) -> dict[str, float]:
     """Share of every stage in cold runs of their own, which the sampling may slow down."""
-    package = retarget.__module__.rpartition(".")[0]
-    modules = {f"{package}.{module}": stage for module, stage in STAGES.items()}
+    modules = {
+        f"{retargeting.__name__}.{module.name}": STAGES.get(module.name, "assembly")
+        for module in iter_modules(retargeting.__path__)
+    }
     sampler = StageSampler(modules, WHOLE_STAGES)
     for i in range(_PROFILED_RUNS):
         fresh = _nudged(motion, runs + 1 + i)
