@@ -132,9 +132,21 @@ def _make_reference(out: Path, console: Console, quiet: bool) -> Reference:
         reference = make_reference(demonstration, robot, progress=progress)
     reference.save(out / "reference.npz")
     reference_strip(reference, out / "reference.png", pictures=PICTURES, columns=COLUMNS)
-    if reference.report is not None:
-        console.print(reference.report.table())
+    console.print(_proof(reference))
     return reference
+
+
+def _proof(reference: Reference) -> str:
+    assert reference.report is not None
+    figures = reference.report.summary()
+    return (
+        f"{figures['frames']} frames at {figures['fps']:.0f} fps; "
+        f"penetration {1e3 * figures['penetration_max_m']:.2f} mm at most, "
+        f"stance drift {1e3 * figures['stance_drift_max_m']:.1f} mm at most, "
+        f"hands on the box in {figures['contact_fraction_2cm']:.0%} of the frames that ask for it, "
+        f"joint and speed limits exceeded by {figures['joint_violation_max_rad']:.0e} rad "
+        f"and {figures['velocity_violation_max_rad_s']:.0e} rad/s"
+    )
 
 
 def _comparison(before: Evaluation, after: Evaluation) -> str:
