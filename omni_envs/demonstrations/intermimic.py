@@ -8,6 +8,7 @@ unknown), 383:591 joint rotations (xyzw).
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +29,16 @@ SUBJECT_HEIGHTS = {
 }  # fmt: skip
 """Standing height of the OMOMO subjects, m."""
 
-# The OMOMO largebox is a scan of a cardboard box of 0.335 × 0.338 × 0.360 m that lies askew in its
-# own frame (0.471 × 0.459 × 0.408 m along the axes): this is its oriented bounding box.
-_LARGEBOX = Part(
+LARGEBOX = Part(
     Box((0.1675, 0.1689, 0.1800)),
     (0.00103, -0.00161, 0.00638),
     (0.97153, -0.07016, -0.04236, 0.22228),
 )
+"""The OMOMO largebox: the oriented bounding box of its scan.
+
+It is a cardboard box of 0.335 × 0.338 × 0.360 m that lies askew in its own frame: 0.471 × 0.459 ×
+0.408 m along the axes.
+"""
 
 
 def load_intermimic(
@@ -67,7 +71,7 @@ def load_intermimic(
     if object_mesh is not None:
         name, parts = Path(object_mesh).stem, load_convex_parts(object_mesh)
     elif name == "largebox":
-        parts = (_LARGEBOX,)
+        parts = (LARGEBOX,)
     else:
         expected = f"object_mesh=, or a mesh {name or '<object>'}.obj beside the file"
         raise FileFormatError(path, "object", expected, "neither")
@@ -103,7 +107,8 @@ def _read(path: Path) -> np.ndarray:
         raise FileFormatError(path, "file", "an existing InterMimic .pt file", "nothing")
     expected = f"one tensor of shape (T, {COLUMNS}), T ≥ 1"
     try:
-        tensor = torch.load(path, map_location="cpu", weights_only=True)
+        with warnings.catch_warnings(action="ignore"):  # the error below says it all
+            tensor = torch.load(path, map_location="cpu", weights_only=True)
     except Exception as error:  # torch raises whatever zip, pickle and storage raise
         lines = str(error).strip().splitlines() or [type(error).__name__]
         reason = "pickled code" if "weights_only" in str(error) else lines[0]
