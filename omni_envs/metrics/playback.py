@@ -20,6 +20,8 @@ TARGETS = (OBJECT, TERRAIN, GROUND)
 """What a robot can touch beside itself."""
 SELF = "self"
 
+_MEMORY = 2**26  # for contacts; untouched memory costs nothing
+
 
 @dataclass(frozen=True, eq=False)
 class Playback:
@@ -134,6 +136,11 @@ def play(
         geoms.append(data.contact.geom.reshape(-1, 2).copy())
         distances.append(data.contact.dist.copy())
         normals.append(data.contact.frame.reshape(-1, 9)[:, :3].copy())
+    full = data.warning[int(mujoco.mjtWarning.mjWARN_CONTACTFULL)].number
+    if full:  # contacts were dropped: any figure would be too good
+        raise InvalidDataError(
+            "Motion", "contacts", f"fewer than {_MEMORY} bytes hold", f"{full} overflows"
+        )
     geom, normal = np.concatenate(geoms), np.concatenate(normals)
     # The robot's geom first, the target second; MuJoCo's normal points from the first to the
     # second.
@@ -162,6 +169,7 @@ def _compile(robot: Robot, scene: Scene) -> mujoco.MjModel:
         # penetration only.
         geom.margin = REACH if geom.parent.name in ("world", OBJECT) else 0.0
         geom.gap = 0.0
+    spec.memory = _MEMORY
     for first, second in resting_pairs(robot):
         spec.add_exclude(bodyname1=first, bodyname2=second)
     return spec.compile()

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
 
-import mujoco
-
-import omni_envs
 from omni_envs.demonstrations import Demonstration, scale_demonstration
 from omni_envs.demonstrations.source_resampling import resample_source
 from omni_envs.errors import InvalidDataError
 from omni_envs.metrics import ReferenceReport, evaluate
 from omni_envs.progress import ProgressCallback
+from omni_envs.references.key import content_hashes, reference_key, versions
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.reference import Reference
 from omni_envs.retargeting import RetargetOptions, retarget
@@ -76,7 +72,10 @@ def make_reference(
             "licence": demonstration.licence,
             "robot": robot.name,
             "options": asdict(options),
+            "fps": float(fps),
             "versions": versions(),
+            "hashes": content_hashes(demonstration, robot, fps, options),
+            "key": reference_key(demonstration, robot, fps, options),
             "solved_frames": motion.num_frames,
             "solve_seconds": float(motion.frames.seconds.sum()),
         },
@@ -98,8 +97,3 @@ def evaluate_reference(reference: Reference) -> ReferenceReport:
         reference.source,
         relaxed=None if reference.report is None else reference.report.relaxed,
     )
-
-
-def versions() -> Mapping[str, Any]:
-    """Returns the versions that a reference depends on."""
-    return {"omni_envs": omni_envs.__version__, "mujoco": mujoco.__version__}

@@ -6,6 +6,7 @@ import pytest
 from omni_envs.demonstrations import builtin_demonstration
 from omni_envs.errors import InvalidDataError, UnknownNameError
 from omni_envs.references import Reference, evaluate_reference, make_reference
+from omni_envs.references.key import reference_key
 from omni_envs.retargeting import RetargetOptions
 from omni_envs.robots import G1
 
@@ -53,7 +54,9 @@ def test_provenance_says_how_to_make_it_again(demonstration, reference):
     assert provenance["demonstration"] == demonstration.name
     assert provenance["licence"] == demonstration.licence
     assert provenance["options"]["laplacian_weight"] == 10.0
-    assert provenance["versions"].keys() == {"omni_envs", "mujoco"}
+    assert provenance["versions"].keys() == {"omni_envs", "mujoco", "format"}
+    assert provenance["hashes"].keys() >= {"demonstration", "scene", "robot", "settings"}
+    assert provenance["key"] == reference_key(demonstration, G1, 50.0, RetargetOptions())
     assert provenance["solved_frames"] == reference.num_frames
     assert provenance["solve_seconds"] > 0
 
