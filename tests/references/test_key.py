@@ -38,7 +38,7 @@ def test_the_key_covers_everything(demonstration, tmp_path):
             options,
         ),
         (
-            replace(demonstration, contacts={"left_hand": np.ones(demonstration.num_frames, bool)}),
+            replace(demonstration, contacts={"left_hand": touching}),
             G1,
             50.0,
             options,
