@@ -99,8 +99,8 @@ class TerminationConfig:
         end_effector_height: |Δz| of any end effector, m (0.5 for a wall flip).
         object_position: Distance of the object from its reference, m.
         object_angle: Angle of the object to its reference, rad.
-        object_after: The object tests wait until the body is tracked reasonably: until the mean
-            length of the finished episodes, in seconds, has reached this once; 0 does not wait.
+        object_after: The object tests wait until the body is tracked reasonably: until the latest
+            hundred episodes lasted this share of what they could have, once; 0 does not wait.
         max_seconds: Time-out (a truncation), s.
     """
 
@@ -109,7 +109,7 @@ class TerminationConfig:
     end_effector_height: float | None = 0.25
     object_position: float | None = 1.0
     object_angle: float | None = pi / 4
-    object_after: float = 1.0
+    object_after: float = 0.5
     max_seconds: float | None = 10.0
 
 

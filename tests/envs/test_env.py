@@ -1,0 +1,103 @@
+import re
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from omni_envs import registration
+from omni_envs.envs import OmniEnv
+from omni_envs.errors import InvalidDataError, InvalidOptionError
+
+registration.register_all()
+
+
+@pytest.fixture
+def env(reference):
+    return OmniEnv(reference=reference)
+
+
+def test_gymnasiums_checker_passes(reference_file):
+    for entry in registration.ENVIRONMENTS:
+        env = gym.make(entry.id, reference=reference_file)
+        with warnings.catch_warnings():
+            # Joint targets and observations have no natural bounds of one.
+            warnings.filterwarnings("ignore", message=".*Box.*")
+            check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_it_is_the_vector_environment_with_one_simulation(make, reference):
+    env, vector = OmniEnv(reference=reference), make(1, autoreset_mode="DISABLED")
+    a, _ = env.reset(seed=5)
+    b, _ = vector.reset(seed=5)
+    np.testing.assert_array_equal(a, b[0])
+    for action in np.random.default_rng(0).normal(size=(10, 29)):
+        ours, theirs = env.step(action), vector.step(action[None])
+        np.testing.assert_array_equal(ours[0], theirs[0][0])
+        assert ours[1:4] == (theirs[1][0], theirs[2][0], theirs[3][0])
+        for key, value in ours[4].items():
+            assert value == theirs[4][key][0]
+            assert isinstance(value, bool | int | float)
+
+
+def test_attributes_of_the_vector_environment(env):
+    assert env.robot.name == "g1"
+    assert env.policy_layout.size == 160
+    assert env.control_step == pytest.approx(0.02)
+    with pytest.raises(AttributeError):
+        env.nothing  # noqa: B018
+
+
+def test_bad_actions(env):
+    env.reset(seed=0)
+    with pytest.raises(InvalidDataError, match=r"action must be an array \(29,\); got \(3,\)"):
+        env.step(np.zeros(3))
+    action = np.zeros(29)
+    action[4] = np.nan
+    with pytest.raises(InvalidDataError, match=r"action\[4\] must be finite; got nan"):
+        env.step(action)
+    assert np.isfinite(env.step(np.zeros(29))[0]).all()
+
+
+def test_unknown_options_list_the_valid_ones(reference):
+    with pytest.raises(InvalidOptionError, match="'num_envs'.*Valid: action, anchor"):
+        OmniEnv(reference=reference, num_envs=3)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
+        OmniEnv(reference=reference, frameskip=3)
+
+
+def test_a_missing_reference_is_one_clear_error(tmp_path):
+    with pytest.raises(ValueError, match=r"nowhere\.npz"):
+        OmniEnv(reference=str(tmp_path / "nowhere.npz"))
+
+
+def test_gym_make_takes_options_and_truncates(reference_file):
+    env = gym.make(
+        "OmniEnvs/G1BoxCarry-v0",
+        reference=reference_file,
+        preset="beyondmimic",
+        reset={"start": "start", "noise": None},
+        termination={"anchor_height": None, "anchor_tilt": None, "end_effector_height": None},
+    )
+    env.reset(seed=0)
+    steps = 0
+    while True:
+        _, _, terminated, truncated, infos = env.step(np.zeros(29))
+        steps += 1
+        assert not terminated
+        if truncated:
+            break
+    assert steps == 119
+    assert infos["frame"] == 119
+
+
+def test_figures_of_the_docstring(env):
+    """The tables are generated from the code, so they cannot be wrong."""
+    from omni_envs.envs.tables import observation_table, reward_table, termination_table
+
+    text = OmniEnv.__doc__
+    for table in (observation_table, reward_table, termination_table):
+        rows = [re.escape(row.strip()) for row in table().splitlines()]
+        assert len(rows) > 5
+        assert re.search(r"\s*".join(rows), text), table.__name__
