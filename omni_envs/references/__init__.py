@@ -2,7 +2,7 @@
 
 from omni_envs.references.build import evaluate_reference, make_reference
 from omni_envs.references.cache import cache_folder, cached_reference
-from omni_envs.references.foreign import reference_from_motion
+from omni_envs.references.foreign import open_reference, reference_from_motion
 from omni_envs.references.formats import ForeignMotion, load_motion
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.picture import report_picture
@@ -16,6 +16,7 @@ __all__ = [
     "evaluate_reference",
     "load_motion",
     "make_reference",
+    "open_reference",
     "reference_from_motion",
     "reference_from_qpos",
     "report_picture",

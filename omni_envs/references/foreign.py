@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -11,10 +12,31 @@ from omni_envs.demonstrations.source_resampling import resample_source
 from omni_envs.errors import InvalidDataError
 from omni_envs.metrics import evaluate
 from omni_envs.references.build import STANCE
-from omni_envs.references.formats import ForeignMotion
+from omni_envs.references.formats import ForeignMotion, load_motion
 from omni_envs.references.kinematics import reference_from_qpos
+from omni_envs.references.npz import read_npz
 from omni_envs.references.reference import Reference
+from omni_envs.robots import Robot
 from omni_envs.scenes import Scene
+
+
+def open_reference(
+    path: str | Path, robot: str | Robot = "g1", demonstration: Demonstration | None = None
+) -> Reference:
+    """Opens a reference of ours, or completes a robot motion of another project to one.
+
+    Args:
+        path: A file that ``Reference.save`` wrote, or any that ``load_motion`` reads.
+        robot: The robot of a foreign motion.
+        demonstration: What a foreign motion was made from.
+
+    Raises:
+        FileFormatError: The file is neither, or damaged.
+        InvalidDataError: The foreign motion does not fit robot or demonstration.
+    """
+    if "format" in read_npz(path, checked=False):
+        return Reference.load(path)
+    return reference_from_motion(load_motion(path, robot), demonstration)
 
 
 def reference_from_motion(

@@ -30,10 +30,10 @@ class Camera:
     """
 
     azimuth: float = 125.0
-    elevation: float = -14.0
-    distance: float = 2.8
+    elevation: float = -11.0
+    distance: float = 2.3
     look_at: tuple[float, float, float] | None = None
-    height: float = 0.6
+    height: float = 0.58
 
 
 class SceneRenderer:
@@ -65,6 +65,8 @@ class SceneRenderer:
         self._ghost_model = _visual_model(ghost_spec, width, height)
         self._ghost_model.geom_matid[:] = -1
         self._ghost_model.geom_rgba[:] = _GHOST_RGBA
+        # A ghost that coincides with the robot hides inside it instead of flickering through.
+        self._ghost_model.geom_size[:] *= 0.98
         self._ghosts = [mujoco.MjData(self._ghost_model) for _ in range(ghosts)]
         try:
             self._renderer = mujoco.Renderer(self._model, height, width, max_geom=4000)
