@@ -16,7 +16,7 @@ from rich.table import Table
 import omni_envs  # noqa: F401  (registers the environments)
 from omni_envs.errors import InvalidOptionError, MissingDependencyError, OmniEnvsError
 from omni_envs.progress import progress_bar
-from omni_envs.training.config import TrainConfig
+from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.recipes import RECIPES
 
 
@@ -36,11 +36,11 @@ class Arguments:
     trainer: Literal["sb3"] = "sb3"
     """Library that trains."""
 
-    recipe: Literal["small", "published"] = "small"
+    recipe: Literal["small", "quick", "published"] = "small"
     """Settings to start from."""
 
-    num_envs: int = 256
-    """Simulations."""
+    num_envs: int = 0
+    """Simulations; 0 takes the recipe's."""
 
     num_threads: int = 0
     """Physics threads; 0 takes every core."""
@@ -58,7 +58,7 @@ class Arguments:
     """Episodes of the evaluation."""
 
     env_options: str = "{}"
-    """Options of the environment as JSON, over those of the recipe."""
+    """Options of the task as JSON, over those of the recipe."""
 
     ppo: str = "{}"
     """Hyper-parameters as JSON, over those of the recipe."""
@@ -82,14 +82,16 @@ def make_config(arguments: Arguments) -> TrainConfig:
             )
         return replace(config, **ends)
     recipe = RECIPES[arguments.recipe]
+    env_options = _mapping("--env-options", arguments.env_options)
     data = {
         "env": arguments.env,
         "out": arguments.out,
         "trainer": arguments.trainer,
-        "num_envs": arguments.num_envs,
+        "num_envs": arguments.num_envs or recipe.num_envs,
         "num_threads": arguments.num_threads,
         "seed": arguments.seed,
-        "env_options": {**recipe.env_options, **_mapping("--env-options", arguments.env_options)},
+        "env_options": merged(recipe.env_options, env_options),
+        "training_options": recipe.training_options,
         "ppo": {**asdict(recipe.ppo), **_mapping("--ppo", arguments.ppo)},
         **ends,
     }

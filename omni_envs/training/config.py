@@ -11,6 +11,8 @@ from typing import Any, Literal
 from omni_envs.errors import FileFormatError, InvalidOptionError
 
 CONFIG_FILE = "config.json"
+PRIVILEGED: Mapping[str, Any] = {"observation": {"privileged": True}}
+"""Training options of an asymmetric critic."""
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,10 @@ class TrainConfig:
         num_envs: Simulations.
         num_threads: Physics threads; 0 takes every core.
         seed: Seed of the network, the exploration and the environment.
-        env_options: Options of the environment, as ``gymnasium.make`` takes them; what trains
-            faster (``{"action": {"mode": "residual"}}``) or helps the critic is set here.
+        env_options: Options of the environment, as ``gymnasium.make`` takes them, JSON-compatible:
+            the task that the policy is for, and is evaluated on.
+        training_options: Options over those in training alone: what helps to learn, such as a
+            privileged critic, ``"fast"`` physics or less noise.
         time_limit: Seconds after which training ends before ``steps`` are reached; 0 = no limit.
         checkpoint_every: Updates between two checkpoints.
         evaluation_episodes: Episodes of the evaluation.
@@ -85,6 +89,7 @@ class TrainConfig:
     num_threads: int = 0
     seed: int = 0
     env_options: Mapping[str, Any] = field(default_factory=dict)
+    training_options: Mapping[str, Any] = field(default_factory=lambda: PRIVILEGED)
     time_limit: float = 0.0
     checkpoint_every: int = 50
     evaluation_episodes: int = 100
@@ -96,12 +101,18 @@ class TrainConfig:
         if self.trainer != "sb3":
             raise InvalidOptionError(f"TrainConfig: trainer must be 'sb3'; got {self.trainer!r}.")
         object.__setattr__(self, "out", Path(self.out))
+        for name in ("env_options", "training_options"):
+            try:
+                object.__setattr__(self, name, json.loads(json.dumps(dict(getattr(self, name)))))
+            except (TypeError, ValueError) as error:
+                raise InvalidOptionError(
+                    f"TrainConfig: {name} must be a JSON-compatible mapping ({error})."
+                ) from error
 
     def to_dict(self) -> dict[str, Any]:
         """Returns JSON-compatible data; ``from_dict`` is its inverse."""
         data = asdict(self)
         data["out"] = str(self.out)
-        data["env_options"] = json.loads(json.dumps(dict(self.env_options)))
         data["ppo"]["hidden"] = list(self.ppo.hidden)
         return data
 
@@ -144,6 +155,16 @@ class TrainConfig:
             return cls.from_dict({**data, "out": Path(run)})
         except (ValueError, TypeError) as error:
             raise FileFormatError(path, "content", "a TrainConfig as JSON", str(error)) from error
+
+
+def merged(options: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns environment options with changes: two mappings are merged field by field."""
+    result = dict(options)
+    for name, change in changes.items():
+        old = result.get(name)
+        both = isinstance(old, Mapping) and isinstance(change, Mapping)
+        result[name] = {**old, **change} if both else change  # type: ignore[dict-item]
+    return result
 
 
 def _positive(owner: str, name: str, value: float) -> None:

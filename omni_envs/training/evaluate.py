@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 from omni_envs.progress import ProgressCallback
-from omni_envs.training.config import TrainConfig
+from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.rollout import Episodes, Policy, play
 from omni_envs.training.statistics import wilson_interval
 
@@ -71,20 +71,20 @@ class Evaluation:
 def evaluation_options(
     options: Mapping[str, Any], *, randomized: bool = True, file: bool = False
 ) -> dict[str, Any]:
-    """Returns environment options for evaluating a policy that was trained with ``options``.
+    """Returns the options of the environment that a policy for ``options`` is evaluated in.
 
     Episodes start at the motion's first frame and last to its end, the object counts from the
     first step, physics are the default ones.
 
     Args:
-        options: Options of the training environment.
-        randomized: With the randomization, the noise and the pushes of training, or without any.
+        options: Options of the task (``TrainConfig.env_options``).
+        randomized: With the randomization, the noise and the pushes of the task, or without any.
         file: For a policy file, whose actions are standard ones whatever it was trained as.
     """
     changes: dict[str, Any] = {
         "physics": "default",
         "reset": {"start": "start"},
-        "observation": {"privileged": False},
+        "observation": {},
         "termination": {"max_seconds": None, "object_after": 0.0},
     }
     if not randomized:
@@ -98,13 +98,7 @@ def evaluation_options(
         }
     if file:
         changes["action"] = {"mode": "default", "limit": UNCLIPPED}
-    result = dict(options)
-    for name, change in changes.items():
-        old = result.get(name)
-        if isinstance(change, dict) and isinstance(old, Mapping):
-            change = {**old, **change}
-        result[name] = change
-    return result
+    return merged(options, changes)
 
 
 def make_evaluation_env(config: TrainConfig, num_envs: int, **kind: bool) -> VectorEnv:

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 from omni_envs.errors import InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint, checkpoints, keep_newest
-from omni_envs.training.config import TrainConfig
+from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.curve import write_history
 from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.ppo import TrackingPPO
@@ -92,7 +92,7 @@ def make_training_env(config: TrainConfig) -> VectorEnv:
         num_envs=config.num_envs,
         vectorization_mode="vector_entry_point",
         num_threads=config.num_threads,
-        **config.env_options,
+        **merged(config.env_options, config.training_options),
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
-from omni_envs.training.config import PPOConfig, TrainConfig
+from omni_envs.training.config import PPOConfig, TrainConfig, merged
 
 
 def _config(tmp_path: Path) -> TrainConfig:
@@ -65,6 +65,23 @@ def test_bad_values_are_one_clear_error(tmp_path, change, message):
     data = {**_config(tmp_path).to_dict(), **change}
     with pytest.raises(InvalidOptionError, match=message):
         TrainConfig.from_dict(data)
+
+
+def test_options_are_merged_field_by_field(tmp_path):
+    task = {"action": {"mode": "residual"}, "physics": "default", "reset": {"start": "start"}}
+    changes = {"action": {"scale": 2.0}, "physics": "fast", "reset": {"noise": None}}
+    assert merged(task, changes) == {
+        "action": {"mode": "residual", "scale": 2.0},
+        "physics": "fast",
+        "reset": {"start": "start", "noise": None},
+    }
+    assert task["action"] == {"mode": "residual"}
+
+
+def test_options_that_are_not_json_are_refused(tmp_path):
+    for name in ("env_options", "training_options"):
+        with pytest.raises(InvalidOptionError, match=f"{name} must be a JSON-compatible mapping"):
+            dataclasses.replace(_config(tmp_path), **{name: {"reference": object()}})
 
 
 def test_missing_or_damaged_files_are_one_clear_error(tmp_path):

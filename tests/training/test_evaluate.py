@@ -13,21 +13,21 @@ def standing() -> Reference:
     return reference_from_qpos(G1, 50.0, np.tile(G1.default_qpos, (40, 1)))
 
 
-def test_options_of_training_are_kept_but_for_what_evaluation_fixes():
-    trained = {
+def test_options_of_the_task_are_kept_but_for_what_evaluation_fixes():
+    task = {
         "preset": "beyondmimic",
         "physics": "fast",
-        "observation": {"privileged": True, "state_estimation": False},
+        "observation": {"state_estimation": False},
         "action": {"mode": "residual", "scale": 2.0},
         "reset": {"start": "adaptive", "noise": {"joint_position": 0.2}},
     }
-    config = make_config(**evaluation_options(trained))
+    config = make_config(**evaluation_options(task))
     assert config.physics.timestep == 0.005
-    assert not config.observation.privileged and not config.observation.state_estimation
+    assert not config.observation.state_estimation
     assert config.reset.start == "start" and config.reset.noise.joint_position == 0.2
     assert config.termination.max_seconds is None and config.termination.object_after == 0.0
     assert config.action.mode == "residual" and config.anchor == "torso"
-    assert trained["observation"] == {"privileged": True, "state_estimation": False}
+    assert task["observation"] == {"state_estimation": False}
 
 
 def test_without_randomization_nothing_is_left_to_chance(standing):

@@ -1,0 +1,32 @@
+import pytest
+
+from omni_envs.tracking import make_config
+from omni_envs.training.config import PPOConfig, TrainConfig, merged
+from omni_envs.training.evaluate import evaluation_options
+from omni_envs.training.recipes import RECIPES
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_options_are_valid_and_saved_whole(name, tmp_path):
+    recipe = RECIPES[name]
+    config = TrainConfig(
+        "X", tmp_path, 1, env_options=recipe.env_options,
+        training_options=recipe.training_options, ppo=recipe.ppo,
+    )  # fmt: skip
+    config.save()
+    assert TrainConfig.load(tmp_path) == config
+    assert make_config(**merged(config.env_options, config.training_options)).observation.privileged
+
+
+def test_the_published_recipe_is_the_published_one():
+    assert RECIPES["published"].ppo == PPOConfig()
+    assert make_config(**RECIPES["published"].env_options) == make_config()
+
+
+def test_what_is_easier_in_training_is_not_so_in_the_evaluation():
+    evaluated = make_config(**evaluation_options(RECIPES["quick"].env_options))
+    paper = make_config()
+    assert evaluated.randomization == paper.randomization
+    assert evaluated.observation.noise == paper.observation.noise
+    assert evaluated.reset.noise == paper.reset.noise
+    assert evaluated.physics == paper.physics
