@@ -32,9 +32,9 @@ def bench_step(
 ) -> dict[str, Any]:
     """Measures an environment and the raw physics of the same model on the same states.
 
-    Raw physics is ``mujoco.batch``: ``step(nstep=substeps)`` with constant controls, nothing read, on the
-    same per-simulation models and started from the environment's states before every slice. Slices of
-    both take turns, so that whatever else the machine does hits both alike.
+    Raw physics is ``mujoco.batch``: ``step(nstep=substeps)`` with constant controls, nothing read,
+    on the same per-simulation models and started from the environment's states before every slice.
+    Slices of both take turns, so that whatever else the machine does hits both alike.
 
     Args:
         env: Environment id.
@@ -46,15 +46,17 @@ def bench_step(
 
     Returns:
         ``steps_per_s`` and ``raw_steps_per_s`` (control steps, medians), ``ratio`` (median over the
-        pairs of slices), ``bytes_per_env`` (growth of the process by making and running the environment),
-        and the conditions.
+        pairs of slices), ``bytes_per_env`` (growth of the process by making and running the
+        environment), and the conditions.
     """
     base = _resident_bytes()
     started = time.perf_counter()
     vector = _make(env, num_envs, num_threads, options)
     construct = time.perf_counter() - started
     rng = np.random.default_rng(seed)
-    actions = 0.3 * rng.standard_normal((SLICE, *vector.action_space.shape)).astype(np.float32)
+    actions = 0.3 * rng.standard_normal((SLICE, num_envs, vector.robot.num_joints)).astype(
+        np.float32
+    )
     vector.reset(seed=seed)
     for action in actions:
         vector.step(action)
@@ -63,7 +65,8 @@ def bench_step(
     raw = Batch(vector.simulation.model, num_envs, live.nthread)
     vector.simulation.copy_models_to(raw)
     substeps = vector.config.physics.substeps
-    ours, theirs = [], []
+    ours: list[float] = []
+    theirs: list[float] = []
     finish = time.perf_counter() + seconds
     while time.perf_counter() < finish or len(ours) < 3:
         for name in _STATE:
@@ -142,7 +145,8 @@ def bench_humanoid(*, seconds: float = 5.0, seed: int = 0) -> dict[str, float]:
 def _turns(
     play: Any, load: Any, data: mujoco.MjData, model: mujoco.MjModel, substeps: int, seconds: float
 ) -> dict[str, float]:
-    ours, theirs = [], []
+    ours: list[float] = []
+    theirs: list[float] = []
     finish = time.perf_counter() + seconds
     while time.perf_counter() < finish or len(ours) < 3:
         load()

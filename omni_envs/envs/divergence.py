@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +42,8 @@ class Divergence:
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("wb") as file:
-            np.savez(file, **{k: np.asarray(v) for k, v in vars(self).items()})
+            arrays: dict[str, Any] = {k: np.asarray(v) for k, v in vars(self).items()}
+            np.savez(file, **arrays)
         return path
 
 

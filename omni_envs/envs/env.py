@@ -20,10 +20,85 @@ _OWN = ("num_envs", "num_threads", "autoreset_mode")
 class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     """A humanoid that tracks a reference motion.
 
-    The code is that of ``OmniVectorEnv`` with one simulation; so are the options.
+    The code is that of ``OmniVectorEnv`` with one simulation; so are the options. All tables are
+    for the G1 and the preset ``paper``; every number is an option, see ``omni_envs.tracking``.
+
+    **Action**: ``Box(-10, 10, (n,))``. The target of joint j is default_j + scale_j · a_j with
+    scale = 0.25 · effort / kp, held for a control step of 0.02 s; with ``action={"mode":
+    "residual"}`` the reference's joint position takes the place of the default.
+
+    **Observation**: ``Box(-inf, inf, (160,))``; without state estimation the terms
+    ``motion_anchor_pos_b`` and ``base_lin_vel`` are absent, 154 entries. "_b" is the frame of the
+    robot's anchor body, orientations are the first two columns of a rotation matrix by rows, noise
+    is the half width of a uniform distribution.
+
+    | Index   | Name                | Noise | Unit       | Meaning                                 |
+    |---------|---------------------|-------|------------|-----------------------------------------|
+    | 0…57    | command             | 0     | rad, rad/s | reference joints: positions, velocities |
+    | 58…60   | motion_anchor_pos_b | 0     | m          | reference anchor seen by the robot's    |
+    | 61…66   | motion_anchor_ori_b | 0.05  | –          | its orientation, two columns            |
+    | 67…69   | base_lin_vel        | 0.5   | m/s        | root velocity in the root frame         |
+    | 70…72   | base_ang_vel        | 0.2   | rad/s      | root rotation in the root frame         |
+    | 73…101  | joint_pos           | 0.01  | rad        | joint positions minus default           |
+    | 102…130 | joint_vel           | 0.5   | rad/s      | joint velocities                        |
+    | 131…159 | actions             | 0     | –          | previous action                         |
+
+    With ``observation={"privileged": True}`` the observation is a dictionary: ``policy`` as above
+    and ``critic``, without noise, which goes on with
+
+    | Index   | Name          | Noise | Unit | Meaning                               |
+    |---------|---------------|-------|------|---------------------------------------|
+    | 160…201 | body_pos_b    | 0     | m    | tracked bodies in the anchor frame    |
+    | 202…285 | body_ori_b    | 0     | –    | their orientation, two matrix columns |
+    | 286…288 | obj_pos_b     | 0     | m    | object in the anchor frame            |
+    | 289…294 | obj_ori_b     | 0     | –    | its orientation, two matrix columns   |
+    | 295…297 | obj_lin_vel_b | 0     | m/s  | its velocity, in the anchor's axes    |
+
+    **Reward**: the sum of the terms times 0.02 s. A tracking term is weight · exp(-e / σ²), e a
+    squared error, for bodies its mean over the tracked bodies; the body terms compare with the
+    reference moved to the robot's anchor in x, y and yaw.
+
+    | Term                  | Weight / s | σ          |
+    |-----------------------|------------|------------|
+    | anchor_position       | 0.5        | 0.3 m      |
+    | anchor_orientation    | 0.5        | 0.4 rad    |
+    | body_position         | 1          | 0.3 m      |
+    | body_orientation      | 1          | 0.4 rad    |
+    | body_linear_velocity  | 1          | 1 m/s      |
+    | body_angular_velocity | 1          | 3.14 rad/s |
+    | object_position       | 1          | 0.3 m      |
+    | object_orientation    | 1          | 0.4 rad    |
+    | action_rate           | -0.1       | –          |
+    | joint_limit           | -10        | –          |
+    | contact               | -0.1       | –          |
+
+    **End of an episode**: heights are compared with the reference's, the tilt is the difference of
+    the z parts of projected gravity. The object test waits until the body is tracked reasonably,
+    see ``termination.object_after``.
+
+    | Test                | Threshold             | Episode is |
+    |---------------------|-----------------------|------------|
+    | anchor_height       | 0.25 m                | terminated |
+    | anchor_tilt         | 0.8                   | terminated |
+    | end_effector_height | 0.25 m                | terminated |
+    | object              | 1 m or 0.785 rad      | terminated |
+    | diverged            | a numerical explosion | terminated |
+    | motion end          | the last frame        | truncated  |
+    | max_seconds         | 10 s                  | truncated  |
+
+    **Start**: in a frame of the reference, disturbed, see ``reset``. The frame after it is the
+    first to be tracked. ``reset(options={"motion": m, "frame": k})`` starts in a given frame.
+
+    **Info**: ``reward/<term>`` the parts of the reward, ``error/<term>`` the errors (m, rad, m/s,
+    rad/s), ``terminated/<test>``, ``diverged``, and ``motion`` and ``frame`` of the frame to be
+    tracked next.
+
+    Version history:
+        v0: First version.
 
     Args:
-        **options: Options of ``OmniVectorEnv`` but ``num_envs``, ``num_threads`` and ``autoreset_mode``.
+        **options: Options of ``OmniVectorEnv`` but ``num_envs``, ``num_threads`` and
+            ``autoreset_mode``.
 
     Raises:
         OmniEnvsError: An option or reference is not valid; the message names it.
@@ -45,7 +120,7 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
         self.action_space = self.vector.single_action_space
 
     def __getattr__(self, name: str) -> Any:
-        """Attributes of the vector environment: ``robot``, ``config``, ``policy_layout``, …"""
+        """Attributes of the vector environment, such as ``robot`` or ``policy_layout``."""
         if name.startswith("_") or name == "vector":
             raise AttributeError(name)
         return getattr(self.vector, name)
@@ -53,7 +128,7 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Starts an episode; see ``OmniVectorEnv.reset`` for the options ``motion`` and ``frame``."""
+        """Starts an episode; see ``OmniVectorEnv.reset`` for the options."""
         super().reset(seed=seed)
         observations, infos = self.vector.reset(seed=seed, options=options)
         self._np_random = self.vector.np_random
@@ -82,7 +157,7 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
             _single(infos),
         )
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> np.ndarray | None:
         """Returns a (height, width, 3) uint8 picture, the reference as a ghost."""
         return None if self.render_mode is None else self.vector.render_one()
 

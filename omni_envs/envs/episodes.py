@@ -17,8 +17,8 @@ class ObjectGate:
     """Opens the object termination once the body is tracked reasonably.
 
     OmniRetarget tests the object only "after" that. Here reasonable means: over the last
-    ``GATE_EPISODES`` finished episodes, the mean share that episodes lasted of what they could have is at
-    least ``share``. Once open it stays open.
+    ``GATE_EPISODES`` finished episodes, the mean share that episodes lasted of what they could have
+    is at least ``share``. Once open it stays open.
 
     Args:
         share: In [0, 1]; 0 is open from the start.

@@ -19,7 +19,7 @@ def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
 def add_finals(
     infos: dict[str, Any], observations: np.ndarray | dict[str, np.ndarray], done: np.ndarray
 ) -> dict[str, Any]:
-    """Adds ``final_obs`` and ``final_info`` of finished simulations, as Gymnasium's SyncVectorEnv does.
+    """Adds ``final_obs`` and ``final_info`` of finished simulations, as SyncVectorEnv does.
 
     Args:
         infos: Infos of the step, still those of the finished episodes.
@@ -27,8 +27,8 @@ def add_finals(
         done: (N,) which simulations are finished.
 
     Returns:
-        ``infos`` with ``final_obs``, an (N,) object array of observations and None, and ``final_info``
-        with the infos of the step masked by ``done``.
+        ``infos`` with ``final_obs``, an (N,) object array of observations and None, and
+        ``final_info`` with the infos of the step masked by ``done``.
     """
     final_obs = np.full(len(done), None, dtype=object)
     for i in np.flatnonzero(done):

@@ -1,8 +1,8 @@
 """Where the bodies are: a second batch that computes kinematics only.
 
-After ``Batch.step`` the bodies lag the state by a physics step. Computing that stage again in the simulated
-model would repeat collision detection and the constraint rows, an eighth of a control step; here the same
-robot without geoms, limits and actuators costs a third of that.
+After ``Batch.step`` the bodies lag the state by a physics step. Computing that stage again in the
+simulated model would repeat collision detection and the constraint rows, an eighth of a control
+step; here the same robot without geoms, limits and actuators costs a third of that.
 """
 
 from __future__ import annotations

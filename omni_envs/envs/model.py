@@ -24,12 +24,14 @@ class EnvModel:
     """A compiled model and where to read its contact sensors.
 
     Attributes:
-        model: The model.
-        contact_bodies: Names of the bodies that a contact sensor watches; empty where one sensor watches
-            the whole robot.
+        spec: The specification.
+        model: The compiled model.
+        contact_bodies: Names of the bodies that a contact sensor watches; empty where one sensor
+            watches the whole robot.
         samples: Physics steps that the sensors remember.
     """
 
+    spec: mujoco.MjSpec
     model: mujoco.MjModel
     contact_bodies: tuple[str, ...]
     samples: int
@@ -86,14 +88,15 @@ def build_model(robot: Robot, scene: Scene, config: TrackingConfig) -> EnvModel:
             else:
                 _add_contact_sensor(spec, f"contact_{body}", this, root, _STRONGEST, samples)
     if config.randomization.friction is not None:
-        # The robot's own friction decides in its contacts, so that a low draw is felt on rough ground.
+        # The robot's own friction decides in its contacts, so that a low draw is felt on rough
+        # ground.
         for geom in spec.geoms:
             if geom.parent.name in robot.body_names:
                 geom.priority = 1
     if scene.object is not None:
         # Its centre of mass may be moved after compilation: no shortcut for a centred body.
         spec.body(OBJECT).simple = False
-    return EnvModel(spec.compile(), watched, samples)
+    return EnvModel(spec, spec.compile(), watched, samples)
 
 
 def _collides(body: mujoco.MjsBody) -> bool:

@@ -15,7 +15,8 @@ from omni_envs.errors import InvalidOptionError, UnknownNameError
 class UnexpectedOptionError(InvalidOptionError, TypeError):
     """A keyword that the environment does not take.
 
-    It is a ``TypeError`` too, as for any function; some libraries try keywords out and rely on that.
+    It is a ``TypeError`` too, as for any function; some libraries try keywords out and rely on
+    that.
 
     Args:
         owner: The environment class.

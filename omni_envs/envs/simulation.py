@@ -70,8 +70,8 @@ class Simulation:
         """Advances every simulation by a control step under ``ctrl``.
 
         Returns:
-            (N,) whether the simulation diverged. MuJoCo has then reset it to its initial state or will
-            do so: its state means nothing.
+            (N,) whether the simulation diverged. MuJoCo has then reset it to its initial state or
+            will do so: its state means nothing.
         """
         for kept, now in zip(self._before, (self.qpos, self.qvel, self._warmstart), strict=True):
             np.copyto(kept, now)

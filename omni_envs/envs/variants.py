@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 
 import mujoco
 import numpy as np
 from mujoco import batch
 
+from omni_envs.envs.model import EnvModel
 from omni_envs.errors import InvalidOptionError
 from omni_envs.robots import Robot
 from omni_envs.scenes import OBJECT, Box, SceneObject
@@ -17,8 +17,6 @@ from omni_envs.tracking.randomization import scaled_inertia, symmetric
 
 SEED = 20260101
 """Variants are the same in every environment; which one an episode gets comes from its own seed."""
-
-Compile = Callable[[SceneObject], mujoco.MjModel]
 
 
 class ModelVariants:
@@ -34,11 +32,10 @@ class ModelVariants:
         models: The variants themselves where their meshes differ, else empty.
 
     Args:
-        model: The model without randomization.
+        env_model: The model without randomization.
         robot: The robot in it.
         scene_object: The object in it, if any.
         config: What to randomize.
-        compile_with: Compiles the model with another object, for objects that are meshes.
 
     Raises:
         InvalidOptionError: There would be no variant.
@@ -46,15 +43,17 @@ class ModelVariants:
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        env_model: EnvModel,
         robot: Robot,
         scene_object: SceneObject | None,
         config: RandomizationConfig,
-        compile_with: Compile,
     ) -> None:
         if config.variants < 1:
             raise InvalidOptionError("randomization.variants must be at least 1.")
-        self.count, self.fields, self.models = 1, {}, ()
+        self.count = 1
+        self.fields: dict[str, np.ndarray] = {}
+        self.models: tuple[mujoco.MjModel, ...] = ()
+        model = env_model.model
         objects = config.object if scene_object is not None else None
         if not (config.torso_centre_of_mass or config.friction or objects):
             return
@@ -66,8 +65,8 @@ class ModelVariants:
         variants = []
         for _ in range(config.variants):
             if objects is not None and objects.shape and meshes and scene_object is not None:
-                scale = 1.0 + objects.shape * (2.0 * rng.random() - 1.0)
-                variant = compile_with(scene_object.scaled(scale))
+                factor = 1.0 + objects.shape * (2.0 * rng.random() - 1.0)
+                variant = _compile_scaled(env_model.spec, scene_object, factor)
             else:
                 variant = copy.copy(model)
             if config.torso_centre_of_mass is not None:
@@ -94,6 +93,20 @@ class ModelVariants:
         # Of the bounding volumes only those of bodies can differ, not those inside meshes.
         self.fields = {name: v[:, : live[name].shape[1]] for name, v in self.fields.items()}
         return live
+
+
+def _compile_scaled(
+    spec: mujoco.MjSpec, scene_object: SceneObject, factor: float
+) -> mujoco.MjModel:
+    """Compiles the model with the object scaled as a whole, its mass unchanged."""
+    for i, part in enumerate(scene_object.parts):
+        geom = spec.geom(f"{OBJECT}_{i}")
+        geom.pos = factor * np.asarray(part.position)
+        if isinstance(part.shape, Box):
+            geom.size = factor * np.asarray(part.shape.half_extents)
+        else:
+            spec.mesh(geom.meshname).scale = np.full(3, factor)
+    return spec.compile()
 
 
 def _scale_boxes(
@@ -126,7 +139,7 @@ def _randomize_mass(
     body = model.body(OBJECT).id
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.body_iquat[body])
-    principal = rotation.reshape(3, 3)
+    principal: np.ndarray = rotation.reshape(3, 3)
     inertia = scaled_inertia(principal @ np.diag(model.body_inertia[body]) @ principal.T, scale)
     model.body_ipos[body] *= scale
     if config.mass is not None:

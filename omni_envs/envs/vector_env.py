@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,12 +43,12 @@ Options = Mapping[str, Any]
 class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     """N simulations of a robot that tracks a reference; see ``OmniEnv`` for spaces and rewards.
 
-    A control step: the action is held over the physics substeps; terminations and rewards compare the
-    new state with the reference frame that the policy saw; finished simulations restart (SAME_STEP);
-    the reference moves on by a frame; pushes; observations.
+    A control step: the action is held over the physics substeps; terminations and rewards compare
+    the new state with the reference frame that the policy saw; finished simulations restart
+    (SAME_STEP); the reference moves on by a frame; pushes; observations.
 
-    The end of a motion and the time-out are truncations. The same seed and actions give bit-identical
-    results at any number of threads.
+    The end of a motion and the time-out are truncations. The same seed and actions give
+    bit-identical results at any number of threads.
 
     Attributes:
         robot: The robot.
@@ -67,7 +66,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         task: Task whose built-in demonstration is the default reference.
         reference: A reference file, a ``Reference``, a ``Demonstration``, or a list of these.
         preset: ``"paper"`` or ``"beyondmimic"``.
-        anchor: See ``TrackingConfig``; as all options down to ``physics``, where None keeps the preset's.
+        anchor: See ``TrackingConfig``; as all options down to ``physics``, where None keeps the
+            preset's.
         reward: Dataclass or mapping.
         termination: Dataclass or mapping.
         observation: Dataclass or mapping.
@@ -76,8 +76,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         action: Dataclass or mapping.
         physics: Dataclass, mapping, ``"default"`` or ``"fast"``.
         num_threads: Physics threads; 0 takes every core.
-        autoreset_mode: SAME_STEP (``final_obs`` and ``final_info`` in the infos) or DISABLED (finished
-            simulations wait for ``reset(options={"reset_mask": mask})``).
+        autoreset_mode: SAME_STEP (``final_obs`` and ``final_info`` in the infos) or DISABLED
+            (finished simulations wait for ``reset(options={"reset_mask": mask})``).
         max_episode_steps: Time-out in control steps, in place of ``termination.max_seconds``.
         render_mode: ``"rgb_array"`` or None.
         width: Pixels of a picture.
@@ -137,19 +137,15 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             raise InvalidOptionError(
                 f"render_mode must be None or 'rgb_array'; got {render_mode!r}."
             )
-        self.render_mode, self._size, self._renderer = render_mode, (width, height), None
+        self.render_mode, self._size = render_mode, (width, height)
+        self._renderer: Any = None
         self.references = resolve_references(reference, self.robot, task)
         self._library = MotionLibrary(self.robot, self.references, 1 / dt)
         self.scene = common_scene(self.references)
         self._task = TrackingTask(self.robot, config, self._library.has_object)
         env_model = build_model(self.robot, self.scene, config)
-        scene = self.scene
         self._variants = ModelVariants(
-            env_model.model,
-            self.robot,
-            scene.object,
-            config.randomization,
-            lambda o: build_model(self.robot, replace(scene, object=o), config).model,
+            env_model, self.robot, self.scene.object, config.randomization
         )
         self.simulation = Simulation(
             env_model, self.robot, self._variants, num_envs, config.physics.substeps, num_threads
@@ -199,10 +195,10 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Starts all simulations anew, or those of a mask.
 
         Args:
-            seed: Makes everything that follows reproducible; what adaptive sampling and the object gate
-                have learnt is forgotten.
-            options: ``reset_mask``: (N,) bool, the simulations to start; ``motion`` and ``frame``: where
-                to start, integers or one per started simulation, instead of a draw.
+            seed: Makes everything that follows reproducible; what adaptive sampling and the object
+                gate have learnt is forgotten.
+            options: ``reset_mask``: (N,) bool, the simulations to start; ``motion`` and ``frame``:
+                where to start, integers or one per started simulation, instead of a draw.
 
         Returns:
             Observations of all simulations, and infos.
@@ -301,7 +297,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         return tuple(self.render_one(i) for i in range(self.num_envs))
 
     def render_one(self, index: int = 0) -> np.ndarray:
-        """Returns a (height, width, 3) uint8 picture of one simulation, the reference as a ghost."""
+        """Returns a (height, width, 3) uint8 picture of one simulation and its reference."""
         if self._frames is None:
             raise InvalidOptionError("render: call reset first.")
         if self._renderer is None:

@@ -1,4 +1,4 @@
-"""The numbers of the tracking task: frozen dataclasses and the presets ``paper`` and ``beyondmimic``.
+"""The numbers of the tracking task: frozen dataclasses, presets ``paper`` and ``beyondmimic``.
 
 Every field is an environment option. The presets differ where the text of OmniRetarget
 (arXiv 2509.26633) differs from the published code of BeyondMimic (arXiv 2508.08241):
@@ -65,8 +65,8 @@ class RewardConfig:
         joint_limit: Weight of the summed excess over the soft joint limits, rad.
         soft_limit: Soft limits: this share of the joint range, about its middle.
         contact: Weight of the contact count.
-        contact_rule: ``"self"`` counts bodies with self-collision (OmniRetarget), ``"any"`` bodies but
-            feet and hands with any contact (BeyondMimic), ``"substeps"`` physics steps with
+        contact_rule: ``"self"`` counts bodies with self-collision (OmniRetarget), ``"any"`` bodies
+            but feet and hands with any contact (BeyondMimic), ``"substeps"`` physics steps with
             self-collision of any body (mjlab).
         contact_force: Smallest force that counts, N.
         no_orientation: Bodies left out of the orientation term (the ankles, for a wall flip).
@@ -188,7 +188,8 @@ class RandomizationConfig:
 
     Attributes:
         torso_centre_of_mass: ± per axis, m.
-        joint_default: ± on the default joint positions, which action and observation count from, rad.
+        joint_default: ± on the default joint positions, which action and observation count from,
+            rad.
         friction: Smallest and largest sliding friction of the robot's contacts.
         push: Random pushes.
         object: Object properties.
@@ -262,8 +263,8 @@ class ActionConfig:
 
     Attributes:
         mode: The offset: ``"default"`` pose, or ``"residual"``: the reference's joint positions.
-            Only what is passed to ``step`` differs: rewards and the observed previous action are about
-            the action that gives the same target from the default pose, in both modes.
+            Only what is passed to ``step`` differs: rewards and the observed previous action are
+            about the action that gives the same target from the default pose, in both modes.
         limit: Actions are clipped to ± this.
         scale: Factor on the scale of the robot.
     """
@@ -369,7 +370,8 @@ def make_config(preset: str = "paper", **options: Any) -> TrackingConfig:
 
     Args:
         preset: A name of ``PRESETS``.
-        **options: Fields of ``TrackingConfig``: dataclasses, mappings of what differs from the preset,
+        **options: Fields of ``TrackingConfig``: dataclasses, mappings of what differs from
+            the preset,
             or None for no difference. ``physics`` may be a name of ``PHYSICS_PRESETS`` too.
 
     Raises:

@@ -48,8 +48,8 @@ class MotionLibrary:
         fps: Frame rate that they must have: the control rate.
 
     Raises:
-        InvalidDataError: A reference is of another robot, too short, at another rate, or without the
-            object that the others have.
+        InvalidDataError: A reference is of another robot, too short, at another rate, or without
+            the object that the others have.
     """
 
     def __init__(self, robot: Robot, references: Sequence[Reference], fps: float) -> None:

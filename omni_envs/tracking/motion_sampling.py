@@ -1,4 +1,4 @@
-"""Where episodes start: reference-state initialisation, uniform, at the start, or where they fail."""
+"""Where episodes start: anywhere in a motion, at its start, or where episodes fail."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ class MotionSampler:
     """Draws start frames.
 
     Adaptive sampling (BeyondMimic): every motion is cut into bins. A bin's failure average moves by
-    ``ema ← decay · ema + (1 - decay) · failures`` every control step; only terminations count, in the
-    bin of the frame where the episode failed. A bin is drawn with probability
-    ∝ Σ_i kernel_decay^i · (ema + uniform / bins) over itself and the next bins, then a frame inside it.
+    ``ema ← decay · ema + (1 - decay) · failures`` every control step; only terminations count, in
+    the bin of the frame where the episode failed. A bin is drawn with probability
+    ∝ Σ_i kernel_decay^i · (ema + uniform / bins) over itself and the next bins, then a frame inside
+    it.
 
     Args:
         library: The motions.
@@ -72,8 +73,8 @@ class MotionSampler:
         """Returns (bins,) the probability of each bin."""
         adaptive = self.config.adaptive
         weight = self.failures + adaptive.uniform / self.num_bins
-        # A failure has its cause before it: a bin also sees the failures of the next bins of its motion,
-        # the last bin standing for those after it.
+        # A failure has its cause before it: a bin also sees the failures of the next bins of its
+        # motion, the last bin standing for those after it.
         last = (self._first_bin + self._counts - 1)[self.bin_motion]
         place = np.arange(self.num_bins)
         spread = np.zeros(self.num_bins)

@@ -148,7 +148,7 @@ def _policy_terms(
     ]
     position, velocity = estimated if state_estimation else (None, None)
     terms = [
-        ("command", 2 * n, 0.0, "rad, rad/s", "reference joint positions, then velocities"),
+        ("command", 2 * n, 0.0, "rad, rad/s", "reference joints: positions, velocities"),
         position,
         ("motion_anchor_ori_b", 6, noise.anchor_orientation, "–", "its orientation, two columns"),
         velocity,
@@ -175,7 +175,7 @@ def _layout(rows: Sequence[tuple[str, int, float, str, str]]) -> ObservationLayo
 
 
 def policy_observation(state: ObservedState, state_estimation: bool = True) -> Array:
-    """Returns (N, size) the policy's observation without noise, in the order of ``policy_layout``."""
+    """Returns (N, size) the policy's observation without noise, as ``policy_layout`` orders it."""
     xp = array_namespace(state.joint_position)
     anchor, base = state.anchor_quaternion, state.base_quaternion
     relative = quaternion.multiply(quaternion.conjugate(anchor), state.reference_anchor_quaternion)

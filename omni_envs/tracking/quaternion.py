@@ -1,7 +1,8 @@
 """Unit quaternions wxyz (…, 4), for numpy and torch alike.
 
-Products and rotation matrices are bilinear in their quaternions: all products of entries, a (…, 16) array,
-times a constant table. That is two array operations, where writing the entries out takes thirty.
+Products and rotation matrices are bilinear in their quaternions: all products of entries, a (…, 16)
+array, times a constant table. That is two array operations, where writing the entries out takes
+thirty.
 """
 
 from __future__ import annotations
@@ -146,7 +147,7 @@ def yaw_only(q: Array) -> Array:
 
 
 def from_euler(rpy: Array) -> Array:
-    """Returns the rotations of (…, 3) roll, pitch, yaw about the fixed x, y, z axes, in that order."""
+    """Returns the rotations of (…, 3) roll, pitch, yaw about the fixed x, y, z axes."""
     xp = array_namespace(rpy)
     c, s = xp.cos(0.5 * rpy), xp.sin(0.5 * rpy)
     cr, cp, cy = c[..., 0], c[..., 1], c[..., 2]
@@ -163,6 +164,6 @@ def from_euler(rpy: Array) -> Array:
 
 
 def projected_gravity_z(q: Array) -> Array:
-    """Returns the z part of the unit gravity vector in the body frame: -1 upright, 1 upside down."""
+    """Returns the z part of the unit gravity vector in the body frame: -1 upright, 1 inverted."""
     x, y = q[..., 1], q[..., 2]
     return 2.0 * (x * x + y * y) - 1.0

@@ -35,8 +35,8 @@ def start_state(
         rng: Source of chance.
 
     Returns:
-        Fresh qpos and qvel. The root is turned about the world's axes and keeps its angular velocity
-        in the world but for the noise.
+        Fresh qpos and qvel. The root is turned about the world's axes and keeps its angular
+        velocity in the world but for the noise.
     """
     qpos, qvel = qpos.copy(), qvel.copy()
     if noise is None:
@@ -75,8 +75,8 @@ def push(root_quaternion: np.ndarray, config: PushConfig, rng: np.random.Generat
         rng: Source of chance.
 
     Returns:
-        (K, 6) to add to the velocity of the root's free joint: linear in the world, angular in the body
-        frame, drawn about the world's axes.
+        (K, 6) to add to the velocity of the root's free joint: linear in the world, angular in the
+        body frame, drawn about the world's axes.
     """
     count = len(root_quaternion)
     linear, spin = symmetric(rng, count, config.linear), symmetric(rng, count, config.angular)

@@ -78,9 +78,11 @@ def tracking_errors(
     if orientation_bodies is not None:
         q, r = q[:, orientation_bodies], r[:, orientation_bodies]
     angles = alignment.angle(q, r)
-    has_object = object_pose is not None and reference_object_pose is not None
-    if has_object:
-        object_angle = quaternion.angle(object_pose[:, 3:], reference_object_pose[:, 3:])
+    object_distance = object_angle = None
+    if object_pose is not None and reference_object_pose is not None:
+        object_distance = squared_distance(object_pose[:, :3], reference_object_pose[:, :3])
+        turn = quaternion.angle(object_pose[:, 3:], reference_object_pose[:, 3:])
+        object_angle = turn * turn
     return TrackingErrors(
         anchor_position=squared_distance(robot.position[:, anchor], reference.position[:, anchor]),
         anchor_orientation=anchor_angle * anchor_angle,
@@ -92,10 +94,8 @@ def tracking_errors(
         body_angular_velocity=mean_squared_distance(
             robot.angular_velocity, reference.angular_velocity
         ),
-        object_position=squared_distance(object_pose[:, :3], reference_object_pose[:, :3])
-        if has_object
-        else None,
-        object_orientation=object_angle * object_angle if has_object else None,
+        object_position=object_distance,
+        object_orientation=object_angle,
     )
 
 

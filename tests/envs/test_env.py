@@ -61,7 +61,7 @@ def test_bad_actions(env):
 
 
 def test_unknown_options_list_the_valid_ones(reference):
-    with pytest.raises(InvalidOptionError, match="'num_envs'.*Valid: action, anchor"):
+    with pytest.raises(InvalidOptionError, match=r"'num_envs'.*Valid: action, anchor"):
         OmniEnv(reference=reference, num_envs=3)
     with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
         OmniEnv(reference=reference, frameskip=3)
@@ -94,10 +94,15 @@ def test_gym_make_takes_options_and_truncates(reference_file):
 
 def test_figures_of_the_docstring(env):
     """The tables are generated from the code, so they cannot be wrong."""
-    from omni_envs.envs.tables import observation_table, reward_table, termination_table
+    from omni_envs.envs.tables import (
+        critic_table,
+        observation_table,
+        reward_table,
+        termination_table,
+    )
 
     text = OmniEnv.__doc__
-    for table in (observation_table, reward_table, termination_table):
+    for table in (observation_table, critic_table, reward_table, termination_table):
         rows = [re.escape(row.strip()) for row in table().splitlines()]
         assert len(rows) > 5
         assert re.search(r"\s*".join(rows), text), table.__name__

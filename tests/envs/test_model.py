@@ -59,6 +59,6 @@ def test_friction_randomization_decides_against_the_ground(reference):
     model = compiled(reference, preset="beyondmimic").model
     robot = [
         g for g in range(model.ngeom) if model.body(int(model.geom_bodyid[g])).name in G1.body_names
-    ]  # noqa: E501
+    ]
     assert (np.asarray(model.geom_priority)[robot] == 1).all()
     assert int(model.geom_priority[model.geom("ground").id]) == 0

@@ -2,18 +2,15 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
 from omni_envs.envs import OmniVectorEnv
+from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
 
 ACTIONS = np.random.default_rng(0).normal(size=(40, 4, 29)) * 0.5
 
 
 def rollout(env, actions, seed=3):
     observations, _ = env.reset(seed=seed)
-    rows = [(observations,)]
-    for action in actions:
-        rows.append(env.step(action)[:4])
-    return rows
+    return [(observations,), *(env.step(action)[:4] for action in actions)]
 
 
 def identical(a, b):
@@ -145,8 +142,7 @@ def test_truncation_at_the_end_of_the_motion(make, quiet):
     for step in range(1, 10):
         _, _, terminated, truncated, infos = env.step(np.zeros((2, 29)))
         assert not terminated.any()
-        for i in np.flatnonzero(truncated):
-            ends.append((i, step, int(infos["final_info"]["frame"][i])))
+        ends += [(i, step, int(infos["final_info"]["frame"][i])) for i in np.flatnonzero(truncated)]
     # From frame 117 on: 118 and 119 are tracked, 119 is the last.
     assert ends[0] == (1, 2, 119)
     assert (0, 9, 119) in ends
@@ -340,7 +336,7 @@ def test_bad_options(reference):
         make(frameskip=4)
     with pytest.raises(InvalidOptionError, match=r"'rewards'\. Did you mean 'reward'\? Valid: act"):
         make(rewards={})
-    with pytest.raises(UnknownNameError, match="reward option 'body_pos'.*Valid: action_rate"):
+    with pytest.raises(UnknownNameError, match=r"reward option 'body_pos'.*Valid: action_rate"):
         make(reward={"body_pos": 1})
     with pytest.raises(UnknownNameError, match="autoreset mode 'NEXT_STEP'"):
         make(autoreset_mode=AutoresetMode.NEXT_STEP)

@@ -98,6 +98,6 @@ def test_stretched_box_inertia():
             mass
             / 3
             * np.array([h[1] ** 2 + h[2] ** 2, h[0] ** 2 + h[2] ** 2, h[0] ** 2 + h[1] ** 2])
-        )  # noqa: E501
+        )
 
     np.testing.assert_allclose(scaled_inertia(box(h), s), box(h * s), atol=1e-15)
