@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from omni_envs.demonstrations.accad import load_accad
 from omni_envs.demonstrations.builtin import builtin_demonstration, builtin_names
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.intermimic import load_intermimic
 from omni_envs.demonstrations.mocap import load_mocap
 from omni_envs.errors import FileFormatError, InvalidOptionError, UnknownNameError
 
-SUFFIXES = (".npy", ".pt")
+SUFFIXES = (".bvh", ".npy", ".pt")
 """File name endings that ``load_demonstration`` reads."""
 
 
@@ -25,8 +26,8 @@ def load_demonstration(
     """Loads a demonstration.
 
     Args:
-        path_or_name: Name of a built-in demonstration, an InterMimic ``.pt`` file, or a climbing
-            mocap ``.npy`` file.
+        path_or_name: Name of a built-in demonstration, an InterMimic ``.pt`` file, a climbing mocap
+            ``.npy`` file, or a ``.bvh`` file with the ACCAD skeleton.
         object_mesh: Mesh of the object, for formats with an object.
         terrain_mesh: Mesh of the terrain at human scale, for formats without an object.
         height: Standing height of the person, m; None takes what the source says.
@@ -53,6 +54,9 @@ def load_demonstration(
     if suffix == ".npy":
         _refuse(given, f"mocap file {path.name}", ("terrain_mesh", "height"))
         return load_mocap(path, terrain_mesh=terrain_mesh, height=height)
+    if suffix == ".bvh":
+        _refuse(given, f"BVH file {path.name}", ("height",))
+        return load_accad(path, height=height)
     raise FileFormatError(path, "file name", f"one that ends in {', '.join(SUFFIXES)}", path.name)
 
 

@@ -11,11 +11,12 @@ FPS = 30.0
 def resample_positions(positions: np.ndarray, fps: float, target_fps: float = FPS) -> np.ndarray:
     """Resamples (T, …, 3) positions from ``fps`` to ``target_fps``.
 
-    A whole ratio takes every n-th frame, so that nothing is smoothed. Any other
+    A whole ratio takes every n-th frame, so that nothing is smoothed (rates are
+    often written with few digits: 0.1 % off is whole). Any other
     ratio interpolates linearly between recorded frames. Time starts at the first frame.
     """
     step = fps / target_fps
-    if abs(step - round(step)) < 1e-6 * step and round(step) >= 1:
+    if abs(step - round(step)) < 1e-3 * step and round(step) >= 1:
         return positions[:: round(step)]
     frames = len(positions)
     times = np.arange(0.0, frames - 1 + 1e-9, step)

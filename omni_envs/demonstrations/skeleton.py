@@ -105,11 +105,10 @@ def _mocap_leg(side: str) -> tuple[str, ...]:
     return tuple(f"{side}{joint}" for joint in ("UpLeg", "Leg", "Foot", "ToeBase"))
 
 
-def _mocap_contacts(hand: int | None) -> dict[str, tuple[str, ...]]:
+def _mocap_contacts(hands: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
     links: dict[str, tuple[str, ...]] = {}
     for side, title in (("left", "Left"), ("right", "Right")):
-        arm = _mocap_arm(title)
-        links[f"{side}_hand"] = arm[3:hand]
+        links[f"{side}_hand"] = hands[title]
         links[f"{side}_foot"] = (f"{title}ToeBase",)
         links[f"{side}_knee"] = (f"{title}Leg",)
     return links
@@ -136,18 +135,18 @@ MOCAP = Skeleton(
         elbow="{Left}ForeArm",
         hand="{Left}HandMiddle3",
     ),
-    contact_joints=_mocap_contacts(hand=None),
+    contact_joints=_mocap_contacts({s: _mocap_arm(s)[3:] for s in ("Left", "Right")}),
 )
 """The 53 joints of the climbing mocap arrays (T, 53, 3)."""
 
 ACCAD = Skeleton(
     name="ACCAD",
     joint_names=(
-        *("Hips", "ToSpine", "Spine", "Spine1", "Neck", "Head"),
-        *_mocap_arm("Left")[:4],
-        *_mocap_arm("Right")[:4],
-        *_mocap_leg("Left"),
-        *_mocap_leg("Right"),
+        *("Hips", "ToSpine", "Spine", "Spine1", "Neck", "Head", "HeadEnd"),
+        *(*_mocap_arm("Left")[:4], "LeftHandEnd"),
+        *(*_mocap_arm("Right")[:4], "RightHandEnd"),
+        *(*_mocap_leg("Left"), "LeftToeBaseEnd"),
+        *(*_mocap_leg("Right"), "RightToeBaseEnd"),
     ),
     keypoint_joints=_keypoints(
         "Hips",
@@ -159,6 +158,6 @@ ACCAD = Skeleton(
         elbow="{Left}ForeArm",
         hand="{Left}Hand",
     ),
-    contact_joints=_mocap_contacts(hand=4),
+    contact_joints=_mocap_contacts({s: (f"{s}Hand", f"{s}HandEnd") for s in ("Left", "Right")}),
 )
-"""The 22 joints of ACCAD BVH files."""
+"""The 22 joints of ACCAD BVH files and their 5 end sites."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from omni_envs.demonstrations.contact import object_contacts, terrain_contacts
+from omni_envs.demonstrations.contact import KNEE_RADIUS, object_contacts, terrain_contacts
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.stance import STANCE_MODES, stance_schedule
 from omni_envs.errors import InvalidOptionError
@@ -66,6 +66,7 @@ def scale_demonstration(demonstration: Demonstration, robot_height: float) -> So
 
     * joints: lowered so that the lowest toe joint of the clip is at z = 0 (less a 0.1 m mat when no
       toe comes below 0.1 m), then × α. The toe joint of the human becomes the sole of the robot.
+      Someone who crawls may never put a toe flat: knees come no lower than their radius.
     * terrain × α, not lowered: what counts is that the toes meet the surface. Keypoints, stance and
       contact all use the same lowered joints.
     * object: size kept; x, y × α; the height of the first frame is kept and only its changes are
@@ -87,6 +88,8 @@ def scale_demonstration(demonstration: Demonstration, robot_height: float) -> So
     floor = demonstration.keypoints[:, toes, 2].min()
     if floor >= MAT_HEIGHT:
         floor -= MAT_HEIGHT
+    knees = [KEYPOINTS.index("left_knee"), KEYPOINTS.index("right_knee")]
+    floor = min(floor, demonstration.keypoints[:, knees, 2].min() - KNEE_RADIUS)
     offset = np.array([0.0, 0.0, floor])
     keypoints = scale * (demonstration.keypoints - offset)
     scene, poses = demonstration.scene, demonstration.object_poses

@@ -21,13 +21,13 @@ def test_unknown_name_lists_the_built_ins():
 @pytest.mark.parametrize("name", ["clip.fbx", "clip.mp4"])
 def test_unknown_format(tmp_path, name):
     (tmp_path / name).write_text("?")
-    with pytest.raises(FileFormatError, match=r"\.npy, \.pt"):
+    with pytest.raises(FileFormatError, match=r"\.bvh, \.npy, \.pt"):
         load_demonstration(tmp_path / name)
 
 
 def test_missing_file_of_a_known_format(tmp_path):
     pytest.importorskip("torch")
-    for name in ("a.pt", "a.npy"):
+    for name in ("a.pt", "a.npy", "a.bvh"):
         with pytest.raises(FileFormatError, match="existing"):
             load_demonstration(tmp_path / name)
 

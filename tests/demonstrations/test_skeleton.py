@@ -6,7 +6,7 @@ from omni_envs.errors import InvalidDataError
 from omni_envs.robots import CONTACT_LINKS, KEYPOINTS
 
 
-@pytest.mark.parametrize(("skeleton", "joints"), [(SMPLH, 52), (MOCAP, 53), (ACCAD, 22)])
+@pytest.mark.parametrize(("skeleton", "joints"), [(SMPLH, 52), (MOCAP, 53), (ACCAD, 27)])
 def test_skeletons_name_every_keypoint_and_link_once(skeleton, joints):
     assert skeleton.num_joints == len(set(skeleton.joint_names)) == joints
     assert set(skeleton.keypoint_joints) == set(KEYPOINTS)
