@@ -16,7 +16,7 @@ from rich.table import Table
 import omni_envs  # noqa: F401  (registers the environments)
 from omni_envs.errors import InvalidOptionError, MissingDependencyError, OmniEnvsError
 from omni_envs.progress import progress_bar
-from omni_envs.training.config import TrainConfig, merged
+from omni_envs.training.config import TrainConfig
 from omni_envs.training.recipes import RECIPES
 
 
@@ -81,21 +81,17 @@ def make_config(arguments: Arguments) -> TrainConfig:
                 f"{arguments.out} is a run on {config.env}: --env must say so."
             )
         return replace(config, **ends)
-    recipe = RECIPES[arguments.recipe]
-    env_options = _mapping("--env-options", arguments.env_options)
-    data = {
-        "env": arguments.env,
-        "out": arguments.out,
-        "trainer": arguments.trainer,
-        "num_envs": arguments.num_envs or recipe.num_envs,
-        "num_threads": arguments.num_threads,
-        "seed": arguments.seed,
-        "env_options": merged(recipe.env_options, env_options),
-        "training_options": recipe.training_options,
-        "ppo": {**asdict(recipe.ppo), **_mapping("--ppo", arguments.ppo)},
+    return RECIPES[arguments.recipe].config(
+        arguments.env,
+        arguments.out,
+        num_envs=arguments.num_envs or None,
+        env_options=_mapping("--env-options", arguments.env_options),
+        ppo=_mapping("--ppo", arguments.ppo),
+        trainer=arguments.trainer,
+        num_threads=arguments.num_threads,
+        seed=arguments.seed,
         **ends,
-    }
-    return TrainConfig.from_dict(data)
+    )
 
 
 def run(arguments: Arguments) -> dict[str, Any]:

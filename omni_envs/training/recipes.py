@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
-from omni_envs.training.config import PRIVILEGED, PPOConfig
+from omni_envs.training.config import PRIVILEGED, PPOConfig, TrainConfig, merged
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,43 @@ class Recipe:
     num_envs: int
     env_options: Mapping[str, Any] = field(default_factory=dict)
     training_options: Mapping[str, Any] = field(default_factory=lambda: PRIVILEGED)
+
+    def config(
+        self,
+        env: str,
+        out: str | Path,
+        steps: int,
+        *,
+        num_envs: int | None = None,
+        env_options: Mapping[str, Any] | None = None,
+        ppo: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> TrainConfig:
+        """Returns the configuration of a run with this recipe.
+
+        Args:
+            env: Environment id.
+            out: Run directory.
+            steps: Control steps to train for.
+            num_envs: Simulations, by default the recipe's.
+            env_options: Options of the task over the recipe's.
+            ppo: Hyper-parameters over the recipe's.
+            **more: Other fields of ``TrainConfig``.
+
+        Raises:
+            InvalidOptionError: A field is unknown or not allowed.
+        """
+        data = {
+            "env": env,
+            "out": Path(out),
+            "steps": steps,
+            "num_envs": self.num_envs if num_envs is None else num_envs,
+            "env_options": merged(self.env_options, env_options or {}),
+            "training_options": self.training_options,
+            "ppo": {**asdict(self.ppo), **(ppo or {})},
+            **more,
+        }
+        return TrainConfig.from_dict(data)
 
 
 _RESIDUAL = {"action": {"mode": "residual"}}

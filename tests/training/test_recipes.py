@@ -1,5 +1,6 @@
 import pytest
 
+from omni_envs.errors import InvalidOptionError
 from omni_envs.tracking import make_config
 from omni_envs.training.config import PPOConfig, TrainConfig, merged
 from omni_envs.training.evaluate import evaluation_options
@@ -9,10 +10,7 @@ from omni_envs.training.recipes import RECIPES
 @pytest.mark.parametrize("name", RECIPES)
 def test_options_are_valid_and_saved_whole(name, tmp_path):
     recipe = RECIPES[name]
-    config = TrainConfig(
-        "X", tmp_path, 1, env_options=recipe.env_options,
-        training_options=recipe.training_options, ppo=recipe.ppo,
-    )  # fmt: skip
+    config = recipe.config("X", tmp_path, 1)
     config.save()
     assert TrainConfig.load(tmp_path) == config
     assert make_config(**merged(config.env_options, config.training_options)).observation.privileged
@@ -30,3 +28,20 @@ def test_what_is_easier_in_training_is_not_so_in_the_evaluation():
     assert evaluated.observation.noise == paper.observation.noise
     assert evaluated.reset.noise == paper.reset.noise
     assert evaluated.physics == paper.physics
+
+
+def test_everything_can_be_overridden(tmp_path):
+    config = RECIPES["small"].config(
+        "X",
+        tmp_path,
+        5,
+        num_envs=7,
+        env_options={"action": {"scale": 2.0}},
+        ppo={"epochs": 1},
+        seed=3,
+    )
+    assert config.num_envs == 7 and config.seed == 3 and config.ppo.epochs == 1
+    assert config.env_options == {"action": {"mode": "residual", "scale": 2.0}}
+    assert config.ppo.hidden == RECIPES["small"].ppo.hidden
+    with pytest.raises(InvalidOptionError, match="unknown"):
+        RECIPES["small"].config("X", tmp_path, 5, sed=3)
