@@ -12,8 +12,8 @@ from omni_envs.retargeting.limits import CONTACT, SELF, RowLimit, Rows
 class ContactLimit(RowLimit):
     """φ_j(q) ≥ -tolerance, linearised: n·(J₂ - J₁) dq ≥ -φ - tolerance (OmniRetarget eq. 4b).
 
-    One broad and narrow phase finds all pairs within the margins, with distance φ and normal n from the
-    first to the second geom. Bodies of the surroundings do not move with dq.
+    One broad and narrow phase finds all pairs within the margins, with distance φ and normal n from
+    the first to the second geom. Bodies of the surroundings do not move with dq.
 
     Args:
         tolerance: Accepted depth against the surroundings, m.
@@ -33,7 +33,8 @@ class ContactLimit(RowLimit):
         mask = configuration.ancestors[bodies]
         A = configuration.wrench_rows(contact.pos, contact.frame[:, :3])
         A *= mask[:, 1] - mask[:, 0]
-        # A body of the surroundings has no degree of freedom in its row; every robot body has the root's.
+        # A body of the surroundings has no degree of freedom in its row; every robot body has the
+        # root's.
         own = mask[:, :, 0].all(axis=1)
         lower = -contact.dist - np.where(own, 0.0, self._tolerance)
         return Rows(A, lower, np.full(len(lower), np.inf), np.where(own, SELF, CONTACT))

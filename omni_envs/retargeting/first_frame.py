@@ -11,8 +11,8 @@ from omni_envs.retargeting.kinematics import Kinematics
 def aligned_poses(configuration: Kinematics, keypoints: np.ndarray) -> list[np.ndarray]:
     """Starting configurations for (15, 3) source keypoints, the most promising first.
 
-    The robot's keypoints in its default pose are aligned rigidly with the source (Kabsch), then turned by
-    half and quarter turns about the vertical: the mesh alone can confuse left and right.
+    The robot's keypoints in its default pose are aligned rigidly with the source (Kabsch), then
+    turned by half and quarter turns about the vertical: the mesh alone can confuse left and right.
 
     Args:
         configuration: Kinematics of the robot; its configuration changes.

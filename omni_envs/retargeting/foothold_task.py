@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import mink
 import numpy as np
-from mink.tasks import BaseTask
 
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.stance_plan import StancePlan
+from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 
-class FootholdTask(BaseTask):
+class FootholdTask(CostTask):
     """½ Σ w (arm · forward - planned)²: heading and pitch of a foot that lands or stands.
 
-    A cost, not a limit: a foot that cannot turn in time lands as it is, and ``StanceLimit`` keeps that.
+    A cost, not a limit: a foot that cannot turn in time lands as it is, and ``StanceLimit`` keeps
+    that.
     """
 
     def __init__(self, plan: StancePlan) -> None:
@@ -28,24 +28,16 @@ class FootholdTask(BaseTask):
         self._targets = plan.arms[t][self._index]
         self._forward = plan.forward[t][self._index[0]]
 
-    def _residual(self, configuration: Kinematics) -> np.ndarray:
-        foot, arm = self._index
-        arms = configuration.feet()[foot, arm + 1, :2]
-        return (arms * self._forward).sum(axis=1) - self._targets
-
-    def cost(self, configuration: Kinematics) -> float:
-        """The cost at a configuration."""
+    def quadratic(self, configuration: Kinematics) -> Quadratic | None:
+        """Returns the Gauss-Newton model of the cost."""
         if not len(self._weights):
-            return 0.0
-        return 0.5 * float(self._weights @ np.square(self._residual(configuration)))
-
-    def compute_qp_objective(self, configuration: Kinematics) -> mink.Objective:
-        """Returns H and c of the quadratic model."""
-        nv = configuration.model.nv
-        if not len(self._weights):
-            return mink.Objective(np.zeros((nv, nv)), np.zeros(nv))
+            return None
         foot, arm = self._index
-        jacobian = configuration.feet_jacobians(configuration.feet())[foot, arm + 1]
+        feet = configuration.feet()
+        arms = feet[foot, arm + 1, :2]
+        residual = (arms * self._forward).sum(axis=1) - self._targets
+        jacobian = configuration.feet_jacobians()[foot, arm + 1]
         J = (jacobian * self._forward[:, :, None]).sum(axis=1)
         weighted = J * self._weights[:, None]
-        return mink.Objective(J.T @ weighted, self._residual(configuration) @ weighted)
+        value = 0.5 * float(self._weights @ np.square(residual))
+        return Quadratic(J.T @ weighted, residual @ weighted, value)

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mink.tasks import BaseTask
 
-from omni_envs.retargeting.foothold_task import FootholdTask
-from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
 from omni_envs.retargeting.options import RetargetOptions
-from omni_envs.retargeting.proximal_task import ProximalTask
-from omni_envs.retargeting.qp import StepQP, step_bounds, step_objective, step_rows
+from omni_envs.retargeting.qp import StepQP, step_bounds, step_model, step_rows
 from omni_envs.retargeting.solver import StepSolver
+from omni_envs.retargeting.tasks import CostTask
 
 _KINDS = (STANCE, SELF, CONTACT)
 
@@ -41,8 +38,7 @@ class FrameSolver:
 
     Args:
         configuration: Kinematics that tasks and limits are evaluated on.
-        mesh: The interaction mesh task.
-        others: All other tasks.
+        tasks: What is minimised.
         bounds: Limits on dq.
         rows: Limits on linear combinations of dq.
         solver: Solver of a step.
@@ -52,21 +48,18 @@ class FrameSolver:
     def __init__(
         self,
         configuration: Kinematics,
-        mesh: InteractionMeshTask,
-        others: list[BaseTask],
+        tasks: list[CostTask],
         bounds: list[BoundLimit],
         rows: list[RowLimit],
         solver: StepSolver,
         options: RetargetOptions,
     ) -> None:
         self.configuration = configuration
-        self.tasks: list[BaseTask] = [mesh, *others]
+        self.tasks = tasks
         self.bounds = bounds
         self.row_limits = rows
         self.solver = solver
         self.options = options
-        self._mesh = mesh
-        self._weight = options.laplacian_weight
 
     def solve(self, q: np.ndarray, iterations: int, radius: float) -> FrameResult:
         """Minimises the tasks from a starting configuration, then restores feasibility.
@@ -80,8 +73,10 @@ class FrameSolver:
         configuration.update(q)
         predicted = np.inf
         while steps < iterations:
-            qp = self._program(radius)
-            before = self._cost()
+            H, g, before = step_model(configuration, self.tasks)
+            lower, upper = step_bounds(configuration, self.bounds)
+            rows = step_rows(configuration, self.row_limits)
+            qp = StepQP(H, g, lower, upper, rows, configuration.metric, radius)
             dq, soft = self.solver(qp)
             configuration.update(configuration.step(dq))
             steps += 1
@@ -91,20 +86,6 @@ class FrameSolver:
         repairs, violations, repair_soft = self._restore()
         q = configuration.data.qpos.copy()
         return FrameResult(q, steps + repairs, violations, soft or repair_soft)
-
-    def _cost(self) -> float:
-        """Half the weighted cost of the current configuration."""
-        cost = 0.5 * self._weight * self._mesh.energy(self.configuration)
-        for task in self.tasks:
-            if isinstance(task, ProximalTask | FootholdTask):
-                cost += task.cost(self.configuration)
-        return cost
-
-    def _program(self, radius: float) -> StepQP:
-        H, g = step_objective(self.configuration, self.tasks)
-        lower, upper = step_bounds(self.configuration, self.bounds)
-        rows = step_rows(self.configuration, self.row_limits)
-        return StepQP(H, g, lower, upper, rows, self.configuration.metric, radius)
 
     def _restore(self) -> tuple[int, tuple[float, float, float], bool]:
         """Shortest steps onto the true constraints, which linearisation may have left violated."""

@@ -1,14 +1,14 @@
-"""The interaction mesh: body and surroundings connected by a Delaunay mesh, and its deformation energy.
+"""The interaction mesh of body and surroundings, and its deformation energy.
 
-The energy of target keypoints p is E(p) = Σ_i ‖L(p_i^target) - L(p_i^source)‖², with uniform Laplacian
-coordinates L(p_i) = p_i - mean of the neighbours (Ho, Komura, Tai 2010; OmniRetarget eq. 1-3), in the frame
-of the object. Only the rows that touch a keypoint vary with the robot. With L = [L_k, L_o] split into the
-15 keypoints and the surface points:
+The energy of target keypoints p is E(p) = Σ_i ‖L(p_i^target) - L(p_i^source)‖², with uniform
+Laplacian coordinates L(p_i) = p_i - mean of the neighbours (Ho, Komura, Tai 2010; OmniRetarget eq.
+1-3), in the frame of the object. Only the rows that touch a keypoint vary with the robot. With L =
+[L_k, L_o] split into the 15 keypoints and the surface points:
 
     E(p) = tr(PᵀMP) + 2 tr(cᵀP) + e₀,   M = L_kᵀL_k,   c = L_kᵀ(L_o P_o - δ),   δ = L P_source,
 
-exactly, a 15 × 15 problem instead of one with 115 vertices. As the rows of L sum to zero, P may be the
-world offsets from the object's origin once c is rotated into the world.
+exactly, a 15 × 15 problem instead of one with 115 vertices. As the rows of L sum to zero, P may be
+the world offsets from the object's origin once c is rotated into the world.
 """
 
 from __future__ import annotations

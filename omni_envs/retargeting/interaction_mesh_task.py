@@ -1,23 +1,22 @@
-"""The deformation energy as a mink task."""
+"""The deformation energy as a task."""
 
 from __future__ import annotations
 
-import mink
 import numpy as np
 
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 
-class InteractionMeshTask(mink.Task):
-    """½ w ‖U p(q) + offset‖²: half the weighted deformation energy up to a constant.
+class InteractionMeshTask(CostTask):
+    """½ w E(q) with the deformation energy E = ‖U p(q) + offset‖² + constant.
 
     45 residuals instead of the 345 of the whole mesh, with the same cost and gradient.
     """
 
     def __init__(self, mesh: InteractionMesh, weight: float) -> None:
-        super().__init__(cost=np.full(mesh.factor.shape[1] * 3, np.sqrt(weight)))
-        self._mesh = mesh
+        self._mesh, self._weight = mesh, weight
         self.set_frame(0)
 
     def set_frame(self, t: int) -> None:
@@ -27,13 +26,15 @@ class InteractionMeshTask(mink.Task):
 
     def energy(self, configuration: Kinematics) -> float:
         """Deformation energy, weight 1, m²."""
-        return float(np.square(self.compute_error(configuration)).sum()) + self._constant
+        residual = self._factor @ configuration.keypoints() + self._offset
+        return float(np.square(residual).sum()) + self._constant
 
-    def compute_error(self, configuration: Kinematics) -> np.ndarray:
-        """(45,) residuals, coordinate by coordinate."""
-        return (self._factor @ configuration.keypoints() + self._offset).T.ravel()
-
-    def compute_jacobian(self, configuration: Kinematics) -> np.ndarray:
-        """(45, nv) Jacobian of the residuals."""
-        jacobian = configuration.keypoint_jacobians(configuration.keypoints())
-        return (self._factor @ jacobian).reshape(-1, jacobian.shape[-1])
+    def quadratic(self, configuration: Kinematics) -> Quadratic:
+        """Returns the Gauss-Newton model of the cost."""
+        points = configuration.keypoints()
+        residual = (self._factor @ points + self._offset).T.ravel()
+        jacobian = self._factor @ configuration.keypoint_jacobians()
+        jacobian = jacobian.reshape(len(residual), -1)
+        weighted = self._weight * jacobian
+        energy = float(residual @ residual) + self._constant
+        return Quadratic(jacobian.T @ weighted, residual @ weighted, 0.5 * self._weight * energy)

@@ -30,7 +30,8 @@ class StepVelocityLimit(BoundLimit):
     """
 
     def __init__(self, robot: Robot, fps: float, fraction: float) -> None:
-        # A hair inside, so that a velocity computed from rounded positions still satisfies the limit.
+        # A hair inside, so that a velocity computed from rounded positions still satisfies the
+        # limit.
         self._step = robot.velocity_limits * (fraction / fps) * (1.0 - 1e-6)
         self._previous: np.ndarray | None = None
 

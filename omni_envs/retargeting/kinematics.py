@@ -52,6 +52,7 @@ class Kinematics(mink.Configuration):
         self_distance: float | None = 0.02,
     ) -> None:
         self.robot = robot
+        self._memory = {}
         super().__init__(_compile(robot, scene, contact_distance, self_distance))
         model = self.model
         self.ancestors = ancestor_mask(model)
@@ -93,13 +94,22 @@ class Kinematics(mink.Configuration):
         mujoco.mj_integratePos(self.model, q, dq, 1.0)
         return q
 
+    def update(self, q: np.ndarray | None = None) -> None:
+        """Moves to the (nq,) configuration q; forgets what was computed at the last one."""
+        self._memory: dict[str, np.ndarray] = {}
+        super().update(q)
+
     def positions(self, points: Points) -> np.ndarray:
         """(K, 3) world positions of points."""
         rotation = self.data.xmat[points.bodies].reshape(-1, 3, 3)
         return self.data.xpos[points.bodies] + (rotation @ points.offsets[:, :, None])[:, :, 0]
 
     def jacobians(self, points: Points, positions: np.ndarray) -> np.ndarray:
-        """(3, K, nv) Jacobians of points at (K, 3) world positions.
+        """(3, K, nv) Jacobians of points at (K, 3) world positions."""
+        return self.body_jacobians(points.bodies, positions)
+
+    def body_jacobians(self, bodies: np.ndarray, positions: np.ndarray) -> np.ndarray:
+        """(3, K, nv) Jacobians of (K, 3) world points that move with (K,) bodies.
 
         J = mask ⊙ (linear + angular × (p - com)), from the spatial axes of all degrees of freedom.
         """
@@ -112,38 +122,44 @@ class Kinematics(mink.Configuration):
         np.subtract(wz * x, wx * z, out=jacobian[1])
         np.subtract(wx * y, wy * x, out=jacobian[2])
         jacobian += cdof[:, 3:].T[:, None, :]
-        jacobian *= self.ancestors[points.bodies]
+        jacobian *= self.ancestors[bodies]
         return jacobian
 
     def keypoints(self) -> np.ndarray:
         """(15, 3) world keypoints."""
-        return self.positions(self._keypoints)
+        if "keypoints" not in self._memory:
+            self._memory["keypoints"] = self.positions(self._keypoints)
+        return self._memory["keypoints"]
 
-    def keypoint_jacobians(self, positions: np.ndarray) -> np.ndarray:
+    def keypoint_jacobians(self) -> np.ndarray:
         """(3, 15, nv) Jacobians of the keypoints."""
-        return self.jacobians(self._keypoints, positions)
+        return self.jacobians(self._keypoints, self.keypoints())
 
     def soles(self) -> np.ndarray:
         """(2, K, 3) world sole points, left foot first."""
         return self.positions(self._soles).reshape(2, -1, 3)
 
     def feet(self) -> np.ndarray:
-        """(2, 3, 3) toe tip, arm from there to the heart (mean corner) of the sole, arm to the left.
+        """(2, 3, 3) toe tip, and arms from there to the heart of the sole and to the left.
 
-        The arm to the left is 0.1 m long.
+        The heart is the mean corner. The arm to the left is 0.1 m long.
         """
-        feet = self.positions(self._feet).reshape(2, 3, 3)
-        feet[:, 1:] -= feet[:, :1]
-        return feet
+        if "feet" not in self._memory:
+            feet = self.positions(self._feet).reshape(2, 3, 3)
+            feet[:, 1:] -= feet[:, :1]
+            self._memory["feet"] = feet
+        return self._memory["feet"]
 
-    def feet_jacobians(self, feet: np.ndarray) -> np.ndarray:
+    def feet_jacobians(self) -> np.ndarray:
         """(2, 3, 2, nv) Jacobians of what ``feet`` returns, x and y only."""
-        points = feet.copy()
-        points[:, 1:] += points[:, :1]
-        jacobian = self.jacobians(self._feet, points.reshape(6, 3))[:2]
-        jacobian = np.moveaxis(jacobian, 0, 1).reshape(2, 3, 2, -1)
-        jacobian[:, 1:] -= jacobian[:, :1]
-        return jacobian
+        if "feet_jacobians" not in self._memory:
+            points = self.feet().copy()
+            points[:, 1:] += points[:, :1]
+            jacobian = self.jacobians(self._feet, points.reshape(6, 3))[:2]
+            jacobian = jacobian.reshape(2, 2, 3, -1).transpose(1, 2, 0, 3).copy()
+            jacobian[:, 1:] -= jacobian[:, :1]
+            self._memory["feet_jacobians"] = jacobian
+        return self._memory["feet_jacobians"]
 
     def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""

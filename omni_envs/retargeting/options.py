@@ -22,11 +22,11 @@ class StanceOptions:
     """How planted feet are held.
 
     Attributes:
-        anchored: Stance set in which the whole sole stays where it was at the start of the interval. None
-            anchors nothing.
+        anchored: Stance set in which the whole sole stays where it was at the start of the
+            interval. None anchors nothing.
         tolerance: Half width of the window of an anchored toe tip, m.
-        heart_tolerance: Half width of the window of the heart of an anchored sole about the toe tip, m: room
-            for some 8° of roll.
+        heart_tolerance: Half width of the window of the heart of an anchored sole about the toe
+            tip, m: room for some 8° of roll.
         loose: Wider stance set in which the sole may move slowly. None leaves it free.
         loose_speed: Largest speed of a sole point in the loose set, m/s.
     """
@@ -55,19 +55,21 @@ class RetargetOptions:
         surface_points: Points on object or terrain in the interaction mesh (OmniRetarget: 100).
         laplacian_weight: Weight of the deformation energy (OmniRetarget: 10).
         smoothness_weight: Weight of the distance to the previous frame (OmniRetarget: 0.2).
-        contact_weight: Weight of the distance between a touching link and the point of the surface that the
-            human touches, 0 switches it off. Not in the paper.
-        trust_region: Radius of one step in the metric S, where ‖δquaternion‖ counts (OmniRetarget: 0.2).
+        contact_weight: Weight of the distance between a touching link and the point of the surface
+            that the human touches, 0 switches it off. Not in the paper.
+        trust_region: Radius of one step in the metric S, where ‖δquaternion‖ counts (OmniRetarget:
+            0.2).
         iterations: Most steps per frame (OmniRetarget: 10).
         first_iterations: Most steps on the first frame (OmniRetarget: 50).
-        convergence: Stop when the predicted cost changes relatively less. 1e-3 halves the steps of the
-            official 1e-5 and costs 0.01 % of energy.
+        convergence: Stop when the predicted cost changes relatively less. 1e-3 halves the steps of
+            the official 1e-5 and costs 0.01 % of energy.
         penetration_tolerance: Depth that counts as no penetration, m (OmniRetarget: 1e-3).
         contact_distance: Pairs of robot and surroundings closer than this are constrained, m.
         self_collision: Keep the robot's own bodies apart.
         self_distance: Pairs of robot bodies closer than this are constrained, m.
         stance: How planted feet are held.
-        velocity_limits: Fraction of the actuators' speed limits that a step may use; None is no limit.
+        velocity_limits: Fraction of the actuators' speed limits that a step may use; None is no
+            limit.
         restoration_iterations: Most steps that repair what linearisation left violated.
         restoration_tolerance: Violation that needs no repair, m.
         solver: ``"daqp"``, or ``"clarabel"``, which takes the trust region as a second-order cone.
@@ -78,7 +80,7 @@ class RetargetOptions:
     surface_points: int = 100
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
-    contact_weight: float = 0.0
+    contact_weight: float = 100.0
     trust_region: float = 0.2
     iterations: int = 10
     first_iterations: int = 50

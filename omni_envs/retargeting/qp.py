@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from mink.tasks import BaseTask
 
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import BoundLimit, RowLimit, Rows
-from omni_envs.retargeting.proximal_task import ProximalTask
+from omni_envs.retargeting.tasks import CostTask
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +71,26 @@ def step_bounds(
 
 
 def step_objective(
-    configuration: Kinematics, tasks: Sequence[BaseTask]
+    configuration: Kinematics, tasks: Sequence[CostTask]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """H and g of all tasks, as ``mink.build_ik`` stacks them."""
+    """H and g of the sum of all tasks."""
+    return step_model(configuration, tasks)[:2]
+
+
+def step_model(
+    configuration: Kinematics, tasks: Sequence[CostTask]
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """H, g and value of the sum of all tasks."""
     nv = configuration.model.nv
-    H, g = np.zeros((nv, nv)), np.zeros(nv)
+    H, g, value = np.zeros((nv, nv)), np.zeros(nv), 0.0
     for task in tasks:
-        if isinstance(task, ProximalTask):  # diagonal: no dense matrix
-            H.flat[:: nv + 1] += task.hessian
-            g += task.gradient(configuration)
+        model = task.quadratic(configuration)
+        if model is None:
             continue
-        objective = task.compute_qp_objective(configuration)
-        H += objective.H
-        g += objective.c
-    return H, g
+        if model.H.ndim == 1:
+            H.flat[:: nv + 1] += model.H
+        else:
+            H += model.H
+        g += model.g
+        value += model.value
+    return H, g, value

@@ -12,7 +12,8 @@ from omni_envs.retargeting.options import RetargetOptions
 RELAXATIONS = ("stance", "self_collision", "penetration")
 """Constraints that may give way where they contradict each other, the first to give way first.
 
-Joint and velocity limits are never relaxed: the previous frame satisfies both, so they never contradict.
+Joint and velocity limits are never relaxed: the previous frame satisfies both, so they never
+contradict.
 """
 
 

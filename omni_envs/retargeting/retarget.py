@@ -20,7 +20,9 @@ import numpy as np
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.errors import InvalidDataError
 from omni_envs.progress import ProgressCallback
+from omni_envs.retargeting.clarabel_solver import solve_clarabel
 from omni_envs.retargeting.contact_limit import ContactLimit
+from omni_envs.retargeting.contact_task import ContactTask
 from omni_envs.retargeting.first_frame import aligned_poses
 from omni_envs.retargeting.foothold_task import FootholdTask
 from omni_envs.retargeting.frame_solver import FrameResult, FrameSolver
@@ -43,7 +45,8 @@ from omni_envs.retargeting.stance_plan import (
 )
 from omni_envs.robots import KEYPOINTS, SIDES, Robot
 
-# Stance windows are wider than what counts as relaxed by this much: numerical slack of the last step.
+# Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
+# step.
 _RELAXED = 2e-4
 _STRIDE = 5
 
@@ -154,6 +157,7 @@ class _Retargeter:
         posture = np.zeros(robot.nv)
         for joint, weight in robot.posture_weights.items():
             posture[6 + robot.joint_names.index(joint)] = weight
+        self.touch = ContactTask(source, self.configuration, options.contact_weight)
         self.posture = ProximalTask(posture)
         self.posture.set_target(np.concatenate([[0, 0, 0, 1, 0, 0, 0], np.zeros(robot.num_joints)]))
         bounds = [JointLimit(robot)]
@@ -164,11 +168,11 @@ class _Retargeter:
         self.limits: list[RowLimit] = [ContactLimit(options.penetration_tolerance)]
         self.solver = FrameSolver(
             self.configuration,
-            self.mesh,
-            [self.smoothness, self.posture],
+            [self.mesh, self.smoothness, self.posture]
+            + ([self.touch] if options.contact_weight > 0 and source.contact_points else []),
             bounds,
             self.limits,
-            solve_daqp,
+            solve_daqp if options.solver == "daqp" else solve_clarabel,
             options,
         )
 
@@ -191,6 +195,7 @@ class _Retargeter:
             if t > 0 and self.velocity is not None:
                 self.velocity.set_previous(previous)
             foothold.set_frame(t)
+            self.touch.set_frame(t)
             stance.hold(t)
             result = self.solver.solve(previous, self.options.iterations, self.options.trust_region)
             stance.record(self.configuration, t)
@@ -204,7 +209,7 @@ class _Retargeter:
         record = SolveRecord(
             energy=energy,
             iterations=iterations,
-            relaxed=(violations > tolerance).any(axis=1),
+            relaxed=np.any(violations > tolerance, axis=1),
             violations={name: violations[:, i] for i, name in enumerate(RELAXATIONS)},
             seconds=seconds,
         )
@@ -225,7 +230,7 @@ class _Retargeter:
             self.configuration.place_object(self.source.object_poses[t])
 
     def _first(self) -> FrameResult:
-        """Frame 0 without stance: the best of several starts, without previous frame or trust region."""
+        """Frame 0 without stance, previous frame or trust region: the best of several starts."""
         self.smoothness.set_target(None)
         if self.velocity is not None:
             self.velocity.set_previous(None)

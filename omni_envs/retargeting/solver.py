@@ -1,19 +1,18 @@
-"""Solving the step: DAQP, an exact trust region, and graded softness where constraints contradict."""
+"""Solving the step: DAQP, an exact trust region, graded softness where constraints contradict."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import daqp
 import numpy as np
 
-from omni_envs.retargeting.limits import CONTACT, SELF, STANCE
+from omni_envs.retargeting.clarabel_solver import solve_clarabel
 from omni_envs.retargeting.qp import StepQP
+from omni_envs.retargeting.softness import softness
 
 _SOFT = 8
-# Weights of soft rows, (quadratic, linear), by kind: each kind outweighs those that give way before it, and
-# the cost. The linear part makes the violation zero wherever zero is possible.
-_SOFTNESS = {STANCE: (1e4, 1e1), SELF: (1e6, 1e3), CONTACT: (1e8, 1e5)}
 _RADIUS_TOLERANCE = 1e-3
 
 
@@ -27,8 +26,8 @@ class StepSolver(Protocol):
 def solve_daqp(qp: StepQP) -> tuple[np.ndarray, bool]:
     """Solves a step with DAQP. Never fails: bounds hold, contradicting rows give way in order.
 
-    The second-order cone ‖dq‖_S ≤ ε is active exactly when the program with H + λS has its solution on the
-    cone, so λ is searched only when the free step is too long.
+    The second-order cone ‖dq‖_S ≤ ε is active exactly when the program with H + λS has its solution
+    on the cone, so λ is searched only when the free step is too long.
     """
     soft = False
     dq = _solve(qp, 0.0)
@@ -72,30 +71,33 @@ def _program(qp: StepQP, damping: float) -> tuple[np.ndarray, ...]:
         H.flat[:: len(H) + 1] += damping * qp.metric
     upper = np.concatenate([qp.upper, qp.rows.upper])
     lower = np.concatenate([qp.lower, qp.rows.lower])
-    np.clip(upper, -1e30, 1e30, out=upper)
-    np.clip(lower, -1e30, 1e30, out=lower)
+    np.minimum(upper, 1e30, out=upper)  # DAQP's infinity
+    np.maximum(lower, -1e30, out=lower)
     return H, qp.g, np.ascontiguousarray(qp.rows.A), upper, lower
 
 
 def _solve(qp: StepQP, damping: float) -> np.ndarray | None:
     program = _program(qp, damping)
     dq, _, flag, _ = daqp.solve(*program, np.zeros(len(program[3]), np.intc), eps_prox=0.0)
-    return dq if flag > 0 else None
+    # DAQP keeps bounds to 1e-6 only.
+    return np.minimum(np.maximum(dq, qp.lower), qp.upper) if flag > 0 else None
 
 
 def _solve_soft(qp: StepQP, damping: float) -> np.ndarray:
     """Solves with soft rows; bounds stay hard and always leave a step."""
     H, g, A, upper, lower = _program(qp, damping)
+    n = len(g)
     sense = np.zeros(len(upper), np.intc)
-    sense[len(g) :] = _SOFT
-    quadratic, linear = np.full(len(upper), 1.0), np.zeros(len(upper))
-    kind = qp.rows.kind
-    for k, (rho, weight) in _SOFTNESS.items():
-        quadratic[len(g) :][kind == k], linear[len(g) :][kind == k] = 1.0 / rho, weight
+    sense[n:] = _SOFT
+    reciprocal, linear = np.ones(len(upper)), np.zeros(len(upper))
+    quadratic, linear[n:] = softness(qp.rows.kind)
+    reciprocal[n:] = 1.0 / quadratic
     model = daqp.Model()
     model.setup(H, g, A, upper, lower, sense)
-    model.soft_weights(quadratic, quadratic, linear, linear)
+    model.soft_weights(reciprocal, reciprocal, linear, linear)
     dq, _, flag, _ = model.solve()
     if flag <= 0:
-        raise AssertionError(f"DAQP failed on an elastic program: exit flag {flag}")
-    return dq
+        # DAQP may cycle on many nearly parallel soft rows; the interior point does not.
+        damped = replace(qp, H=H, radius=np.inf)
+        return solve_clarabel(damped)[0]
+    return np.minimum(np.maximum(dq, qp.lower), qp.upper)

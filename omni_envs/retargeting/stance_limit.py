@@ -10,16 +10,16 @@ from omni_envs.retargeting.options import StanceOptions
 from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE, StancePlan
 
 TIP, HEART, LEFT = 0, 1, 2
-"""Rows of ``Kinematics.feet``: the toe tip, and the arms from there to the heart and to the left."""
+"""Rows of ``Kinematics.feet``: the toe tip, and the arms from there to heart and left."""
 
 
 class StanceLimit(RowLimit):
     """Windows of both feet on the current frame of a plan.
 
-    An anchored foot keeps its **absolute** place: a window about the previous frame, as in the official
-    code, lets the foot creep. Toe tip and heart hold the whole sole; where the plan rolls the foot over its
-    toes or turns it on them, which is not slip, the heart is free to. Non-penetration holds the sole above
-    the ground.
+    An anchored foot keeps its **absolute** place: a window about the previous frame, as in the
+    official code, lets the foot creep. Toe tip and heart hold the whole sole; where the plan rolls
+    the foot over its toes or turns it on them, which is not slip, the heart is free to.
+    Non-penetration holds the sole above the ground.
 
     Args:
         plan: Where the feet should be.
@@ -71,7 +71,7 @@ class StanceLimit(RowLimit):
         if not len(self._held):
             return None
         feet = configuration.feet()
-        jacobian = configuration.feet_jacobians(feet)
+        jacobian = configuration.feet_jacobians()
         nv = jacobian.shape[-1]
         tips, arms = feet[self._held, TIP, :2], feet[self._flat, HEART, :2]
         # The arm to the left keeps no component along the heading.

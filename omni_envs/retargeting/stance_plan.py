@@ -1,17 +1,19 @@
 """Where planted feet stand: footholds chosen before the clip is solved.
 
-Anchoring a foot where it happens to be when a stance begins puts it in the wrong place: the human's foot
-still settles. A foothold in the middle of where the foot would like to be over the whole interval costs a
-tenth of the deformation energy. So a coarse pass without stance finds the wishes, and the plan keeps
+Anchoring a foot where it happens to be when a stance begins puts it in the wrong place: the human's
+foot still settles. A foothold in the middle of where the foot would like to be over the whole
+interval costs a tenth of the deformation energy. So a coarse pass without stance finds the wishes,
+and the plan keeps
 
-* the toe tip of an *anchored* foot in one place, and by ``StanceLimit`` the whole sole, but where the human
-  rolls or turns the foot far on its toes;
+* the toe tip of an *anchored* foot in one place, and by ``StanceLimit`` the whole sole, but where
+  the human rolls or turns the foot far on its toes;
 * the toe tip of a *loose* foot below a speed;
 * consecutive footholds within reach of each other.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import daqp
@@ -27,7 +29,8 @@ FREE, LOOSE, ANCHORED = 0, 1, 2
 _DETOUR = 0.6  # m/s
 _FUNNEL = 0.15  # m: no window wider than this
 _FLAT = 3e-3  # m: a stance whose arm from tip to heart changes less, seen from above, does not roll
-# A foot that would turn (rad) or roll (change of the arm from above, m) by more than this while it stands is
+# A foot that would turn (rad) or roll (change of the arm from above, m) by more than this while it
+# stands is
 # let: forcing it to stand flat and still contorts the robot, as in a crawl.
 _TURN, _ROLL = 1.5, 0.026
 _LYING = 0.9  # least horizontal part of the unit axis to the left with which a foot has a heading
@@ -42,7 +45,8 @@ class FootWishes:
     Attributes:
         tips: (T, 2, 2) horizontal place of the toe tips, m.
         headings: (T, 2) heading, rad, continuous.
-        reach: (T, 2) horizontal distance from tip to heart of the sole along the heading, m; negative.
+        reach: (T, 2) horizontal distance from tip to heart of the sole along the heading, m;
+            negative.
         lying: (T, 2) length of the horizontal part of the unit axis to the left.
     """
 
@@ -61,11 +65,12 @@ class StancePlan:
         turns: (T, 2) the foot turns on its toes while it stands: its heading is free.
         rolls: (T, 2) the foot rolls over its toes while it stands: its pitch is free.
         tips: (T, 2, 2) horizontal place of the toe tip, m.
-        tip_slack: (T, 2) half width of its window, infinite for none: the tolerance on the foothold, and
-            before it what the foot can still go, m.
+        tip_slack: (T, 2) half width of its window, infinite for none: the tolerance on the
+            foothold, and before it what the foot can still go, m.
         tip_step: (T, 2) largest step of the toe tip since the previous frame, m, per axis.
         forward: (T, 2, 2) unit vector of the wished heading.
-        arms: (T, 2, 2) wished components along ``forward`` of the arms to the heart and to the left, m.
+        arms: (T, 2, 2) wished components along ``forward`` of the arms to the heart and to the
+            left, m.
         arm_weights: (T, 2, 2) weights of these wishes, 1/m².
     """
 
@@ -126,8 +131,8 @@ def plan_stance(
         if not runs:
             continue
         for axis in range(2):
-            wish = [wishes.tips[start:end, foot, axis].mean() for start, end in runs]
-            holds = _footholds(runs, np.array(wish), tip_step[:, foot])
+            means = [wishes.tips[start:end, foot, axis].mean() for start, end in runs]
+            holds = _footholds(runs, np.array(means), tip_step[:, foot])
             tips[:, foot, axis] = _look_ahead(runs, holds, len(tier))
         tip_slack[:, foot] = _funnel(runs, detour[:, foot], options.tolerance)
         for start, end in runs:
@@ -162,7 +167,7 @@ def _footholds(runs: list[tuple[int, int]], wish: np.ndarray, step: np.ndarray) 
         wish: (runs,) wished coordinate.
         step: (T,) largest change from the frame before.
     """
-    gaps = zip(runs[:-1], runs[1:], strict=True)
+    gaps = itertools.pairwise(runs)
     reach = np.array([step[before[1] : after[0] + 1].sum() for before, after in gaps])
     if (np.abs(np.diff(wish)) <= reach).all():
         return wish

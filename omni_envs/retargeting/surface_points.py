@@ -11,7 +11,8 @@ from omni_envs.demonstrations.source_motion import SourceMotion
 
 # Upward faces carry feet, hands and knees: they get this many times the points per area of others.
 _TOP_WEIGHT = 4.0
-# Without object and terrain: 9 × 9 jittered ground points, 0.28 m apart at human scale, around the body.
+# Without object and terrain: 9 × 9 jittered ground points, 0.28 m apart at human scale, around the
+# body.
 _GROUND_CELLS, _GROUND_SPACING = 9, 0.28
 
 
@@ -20,7 +21,8 @@ class SurfacePoints:
     """Corresponding points of source and target surroundings.
 
     Attributes:
-        source: (N, 3) or (T, N, 3) points in the frame of the source object, or the world without one.
+        source: (N, 3) or (T, N, 3) points in the frame of the source object, or the world without
+            one.
         target: The same for the target object.
     """
 
@@ -29,7 +31,7 @@ class SurfacePoints:
 
 
 def surface_points(source: SourceMotion, count: int) -> SurfacePoints:
-    """Chooses the surface points of a source: on the object, else on the terrain, else on the ground.
+    """Chooses the surface points of a source: on object, else terrain, else ground.
 
     Deterministic. Object points keep their place when the object shrinks by the source's scale.
 
@@ -74,8 +76,8 @@ def _ground(centres: np.ndarray, spacing: float) -> np.ndarray:
     offsets = np.arange(_GROUND_CELLS) - _GROUND_CELLS // 2
     grid = np.stack(np.meshgrid(offsets, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
     cells = np.floor(centres / spacing).astype(np.int64)[:, None] + grid
-    # A hash of the cell, not a random stream: a cell keeps its point when the body comes back to it. The
-    # jitter avoids cospherical points, for which the Delaunay mesh is arbitrary.
+    # A hash of the cell, not a random stream: a cell keeps its point when the body comes back to
+    # it. The jitter avoids cospherical points, for which the Delaunay mesh is arbitrary.
     seed = cells[..., 0] * 73856093 ^ cells[..., 1] * 19349663
     jitter = np.stack([(seed * k % 10007) / 10007.0 for k in (7919, 104729)], axis=-1)
     xy = (cells + 0.2 + 0.6 * jitter) * spacing

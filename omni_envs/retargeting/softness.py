@@ -1,0 +1,25 @@
+"""How much a row resists where constraints contradict each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omni_envs.retargeting.limits import CONTACT, SELF, STANCE
+
+# (quadratic, linear) weights of the violation by kind: each kind outweighs those that give way
+# before it, and the cost. The linear part makes the violation zero wherever zero is possible.
+_WEIGHTS = {STANCE: (1e4, 1e1), SELF: (1e5, 1e2), CONTACT: (1e6, 1e3)}
+_QUADRATIC = np.array([_WEIGHTS[kind][0] for kind in sorted(_WEIGHTS)])
+_LINEAR = np.array([_WEIGHTS[kind][1] for kind in sorted(_WEIGHTS)])
+
+
+def softness(kind: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Quadratic and linear weight of the violation of rows: ½ρv² + wv.
+
+    Args:
+        kind: (N,) kinds of rows, see ``limits``.
+
+    Returns:
+        (N,) ρ and (N,) w.
+    """
+    return _QUADRATIC[kind], _LINEAR[kind]
