@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from omni_envs.training.evaluate import Evaluation
 
 ENV, ROBOT, DEMONSTRATION = "OmniEnvs/G1BoxCarry-v0", "g1", "box_carry"
-RECIPE, MOST_STEPS, EPISODES = "small", 10**9, 64
+RECIPE, MOST_STEPS, EPISODES = "quick", 10**9, 64
 PICTURES, COLUMNS = 12, 6
 
 _NEEDS = (
@@ -56,7 +56,6 @@ def run_demo(
         except ImportError as error:
             raise MissingDependencyError(package, extra, "The demo") from error
     from omni_envs.export import export_run
-    from omni_envs.training.config import TrainConfig
     from omni_envs.training.evaluate import evaluate_run
     from omni_envs.training.recipes import RECIPES
     from omni_envs.training.run import train
@@ -73,18 +72,16 @@ def run_demo(
     run = out / "run"
     if (run / "config.json").is_file():
         shutil.rmtree(run)
-    recipe = RECIPES[RECIPE]
-    config = TrainConfig(
-        env=ENV,
-        out=run,
-        steps=MOST_STEPS,
+    config = RECIPES[RECIPE].config(
+        ENV,
+        run,
+        MOST_STEPS,
         time_limit=60.0 * minutes,
         seed=seed,
-        env_options={**recipe.env_options, "reference": str(out / "reference.npz")},
+        env_options={"reference": str(out / "reference.npz")},
         evaluation_episodes=EPISODES,
-        ppo=recipe.ppo,
     )
-    trained = train(config, progress=False if quiet else None)
+    trained = train(config, progress=not quiet)
 
     console.rule("[bold]3. evaluation, before and after", align="left")
     with progress_bar("Untrained", "episodes", quiet) as progress:
