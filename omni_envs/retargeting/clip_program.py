@@ -6,30 +6,30 @@ import numpy as np
 
 from omni_envs import rotations
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting.clip_kinematics import ClipKinematics, trace_clip
 from omni_envs.retargeting.clip_qp import Band, ClipQP
 from omni_envs.retargeting.contact_limit import ContactLimit
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
-from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.kept_stance import (
     TIP,
     KeptStance,
     foot_points,
     stance_windows,
 )
-from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.kinematics import Kinematics, Points
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, Rows
 from omni_envs.retargeting.options import RetargetOptions
-from omni_envs.retargeting.proximal_task import ProximalTask
-from omni_envs.retargeting.qp import step_objective, step_rows
+from omni_envs.retargeting.qp import step_rows
 from omni_envs.retargeting.stance_plan import stance_tiers
-from omni_envs.robots import Robot
+from omni_envs.robots import KEYPOINTS, Robot
 
-# Multipliers of these problems are of the order of 1: constraints that can be met are met to 10 µm.
+# Multipliers of these problems are mostly below 10: constraints that can be met are met to 10 µm.
 _STIFFNESS = np.empty(3)
 _STIFFNESS[[STANCE, SELF, CONTACT]] = 1e6, 1e7, 1e7
 _RIDGE = 1e-6
 # Part of a speed limit that is left to the restoration of the true constraints.
 _RESERVE = 0.03
+_K = len(KEYPOINTS)
 
 
 def motion_steps(qpos: np.ndarray) -> np.ndarray:
@@ -74,15 +74,11 @@ class ClipProgram:
             options.contact_distance,
             options.self_distance if options.self_collision else None,
         )
-        mesh = InteractionMesh.of(source, options.surface_points)
-        self.mesh = InteractionMeshTask(mesh, options.laplacian_weight)
-        posture = np.zeros(robot.nv)
+        self.mesh = InteractionMesh.of(source, options.surface_points)
+        self._mesh_weight = options.laplacian_weight
+        self._posture_weight = np.zeros(robot.nv)
         for joint, weight in robot.posture_weights.items():
-            posture[6 + robot.joint_names.index(joint)] = weight
-        self._posture = ProximalTask(posture)
-        self._posture.set_target(
-            np.concatenate([[0, 0, 0, 1, 0, 0, 0], np.zeros(robot.num_joints)])
-        )
+            self._posture_weight[6 + robot.joint_names.index(joint)] = weight
         metric = self.configuration.metric
         self._velocity_weight = options.smoothness_weight * metric
         self._acceleration_weight = acceleration_weight * source.fps**4 * metric
@@ -90,14 +86,19 @@ class ClipProgram:
         if options.velocity_limits is not None:
             self._step = robot.velocity_limits * (options.velocity_limits / source.fps)
         self.contact = ContactLimit(options.penetration_tolerance)
-        self._points = foot_points(robot, self.configuration)
+        keypoints, (bodies, offsets) = [robot.keypoints[k] for k in KEYPOINTS], foot_points(robot)
+        self._points = Points(
+            self.configuration.model,
+            [*(k.body for k in keypoints), *bodies],
+            np.concatenate([[k.offset for k in keypoints], offsets]),
+        )
+        feet = self._trace(qpos, 0, len(qpos)).positions[:, _K:, :2].reshape(-1, 2, 2, 2)
         tiers = stance_tiers(source, options.stance)
-        self.windows = stance_windows(self._feet(qpos), tiers, source.fps, options.stance)
-        self.stance = KeptStance(self.windows, self._points)
+        self.windows = stance_windows(feet, tiers, source.fps, options.stance)
+        self.stance = KeptStance(self.windows, self.configuration)
 
     def place(self, t: int) -> None:
-        """Sets mesh and object to frame t."""
-        self.mesh.set_frame(t)
+        """Puts the object where it is on frame t."""
         if self.source.object_poses is not None:
             self.configuration.place_object(self.source.object_poses[t])
 
@@ -112,71 +113,79 @@ class ClipProgram:
             stop: End of the frames.
             radius: Half width of the box about the motion.
         """
-        frames, n = stop - start, self.robot.nv
-        H, g = np.empty((frames, n, n)), np.empty((frames, n))
-        tips, tip_jacobians = np.empty((frames, 2, 2)), np.empty((frames, 2, 2, n))
-        rows: list[Rows] = []
-        configuration = self.configuration
-        for i, t in enumerate(range(start, stop)):
-            self.place(t)
-            configuration.update(qpos[t])
-            H[i], g[i] = step_objective(configuration, [self.mesh, self._posture])
-            self.stance.set_frame(t, None)
-            rows.append(step_rows(configuration, [self.contact, self.stance]))
-            places = configuration.positions(self._points)
-            jacobian = configuration.jacobians(self._points, places)[:2]
-            tips[i] = places.reshape(2, 2, 3)[:, TIP, :2]
-            tip_jacobians[i] = np.moveaxis(jacobian, 0, 1).reshape(2, 2, 2, n)[:, TIP]
-        D, E = self._add_smoothness(H, g, qpos, start, stop)
-        A, band = _padded(rows, n)
-        B, C, pairs = self._slow_tips(start, tips, tip_jacobians)
+        contacts: list[Rows] = []
+        trace = self._trace(qpos, start, stop, contacts)
+        H, g = self._objective(trace, start)
+        D, E = self._add_smoothness(H, g, qpos, start)
+        frames, n = g.shape
+        feet = trace.positions[:, _K:, :2].reshape(frames, 2, 2, 2)
+        jacobians = trace.jacobians[:, :2, _K:].transpose(0, 2, 1, 3).reshape(frames, 2, 2, 2, n)
+        A, rows = self._rows(contacts, feet, jacobians, start)
+        B, C, pairs = self._slow_tips(feet[:, :, TIP], jacobians[:, :, TIP], start)
         box = self._box(qpos[start:stop, 7:], radius)
         change = self._change(qpos[start:stop, 7:], radius)
-        return ClipQP(H, g, D, E, box, change, band, A, pairs, B, C)
+        return ClipQP(H, g, D, E, box, change, rows, A, pairs, B, C)
 
-    def _feet(self, qpos: np.ndarray) -> np.ndarray:
-        """(T, 2, 2, 2) horizontal places of tip and heart of both feet."""
-        feet = np.empty((len(qpos), 2, 2, 2))
-        for t, q in enumerate(qpos):
-            self.configuration.update(q)
-            feet[t] = self.configuration.positions(self._points).reshape(2, 2, 3)[..., :2]
-        return feet
+    def _trace(
+        self, qpos: np.ndarray, start: int, stop: int, contacts: list[Rows] | None = None
+    ) -> ClipKinematics:
+        """Keypoints and feet of the frames; on request appends the contact rows of each."""
+
+        def visit(t: int) -> None:
+            if contacts is not None:
+                contacts.append(step_rows(self.configuration, [self.contact]))
+
+        return trace_clip(self.configuration, self._points, qpos, start, stop, self.place, visit)
+
+    def _objective(self, trace: ClipKinematics, start: int) -> tuple[np.ndarray, np.ndarray]:
+        """Gauss-Newton blocks of the deformation energy."""
+        count, n = len(trace.positions), self.robot.nv
+        factor, offset = (
+            part[start : start + count] for part in (self.mesh.factor, self.mesh.offset)
+        )
+        residual = (factor @ trace.positions[:, :_K] + offset).transpose(0, 2, 1)
+        jacobian = (factor[:, None] @ trace.jacobians[:, :, :_K]).reshape(count, -1, n)
+        H = self._mesh_weight * (jacobian.transpose(0, 2, 1) @ jacobian)
+        g = self._mesh_weight * (residual.reshape(count, 1, -1) @ jacobian)[:, 0]
+        return H, g
 
     def _add_smoothness(
-        self, H: np.ndarray, g: np.ndarray, qpos: np.ndarray, start: int, stop: int
+        self, H: np.ndarray, g: np.ndarray, qpos: np.ndarray, start: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Adds velocity and acceleration to H and g; returns their off-diagonals D and E.
+        """Adds velocity, acceleration and posture; returns the off-diagonals D and E.
 
         To first order v_t changes by x_{t+1} - x_t, as the root turns little between frames.
         """
-        count, n = len(qpos), g.shape[1]
+        count, (frames, n) = len(qpos), g.shape
         steps = motion_steps(qpos)
-        diagonal, gradient = np.full((count, n), _RIDGE), np.zeros((count, n))
-        first, second = np.zeros((max(count - 1, 0), n)), np.zeros((max(count - 2, 0), n))
+        diagonal = np.tile(self._posture_weight + _RIDGE, (count, 1))
+        gradient = np.zeros((count, n))
+        gradient[:, 6:] = self._posture_weight[6:] * qpos[:, 7:]
+        D, E = np.zeros((max(count - 1, 0), n)), np.zeros((max(count - 2, 0), n))
         weight = self._velocity_weight
         diagonal[1:] += weight
         diagonal[:-1] += weight
         gradient[1:] += weight * steps
         gradient[:-1] -= weight * steps
-        first -= weight
+        D -= weight
         if count > 2:
             weight = self._acceleration_weight
             change = weight * np.diff(steps, axis=0)
-            for shift, sign in ((0, 1.0), (1, -2.0), (2, 1.0)):
-                diagonal[shift : count - 2 + shift] += sign * sign * weight
-                gradient[shift : count - 2 + shift] += sign * change
-            first[1:] -= 2.0 * weight
-            first[:-1] -= 2.0 * weight
-            second += weight
-        part = slice(start, stop)
-        H.reshape(len(H), -1)[:, :: n + 1] += diagonal[part]
-        g += gradient[part]
-        return first[start : stop - 1], second[start : max(stop - 2, start)]
+            for shift, factor in ((0, 1.0), (1, -2.0), (2, 1.0)):
+                diagonal[shift : count - 2 + shift] += factor * factor * weight
+                gradient[shift : count - 2 + shift] += factor * change
+            D[1:] -= 2.0 * weight
+            D[:-1] -= 2.0 * weight
+            E += weight
+        stop = start + frames
+        H.reshape(frames, -1)[:, :: n + 1] += diagonal[start:stop]
+        g += gradient[start:stop]
+        return D[start : stop - 1], E[start : max(stop - 2, start)]
 
     def _box(self, joints: np.ndarray, radius: float) -> Band:
         """The box about the motion, cut by the joint limits."""
-        lower, upper = np.full((2, len(joints), self.robot.nv), radius)
-        lower *= -1.0
+        upper = np.full((len(joints), self.robot.nv), radius)
+        lower = -upper
         low, high = self.robot.reference_joint_ranges.T
         # An interior point needs an interior; rounding is undone by the restoration.
         lower[:, 6:] = np.clip(low - joints, -radius, -1e-7)
@@ -193,8 +202,31 @@ class ClipProgram:
         upper[:, 6:] = np.where(near, np.maximum(limit - steps, 1e-7), np.inf)
         return Band(lower, upper)
 
+    def _rows(
+        self, contacts: list[Rows], feet: np.ndarray, jacobians: np.ndarray, start: int
+    ) -> tuple[np.ndarray, Band]:
+        """Rows of all frames as arrays of equal length: eight windows of feet, then contacts."""
+        frames, n = len(feet), jacobians.shape[-1]
+        counts = np.array([len(r.lower) for r in contacts])
+        shape = (frames, 8 + int(counts.max(initial=0)))
+        A, stiffness = np.zeros((*shape, n)), np.full(shape, _STIFFNESS[STANCE])
+        lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
+        part = slice(start, start + frames)
+        axes, slack = self.windows.axes[part, :, None], self.windows.slack[part]
+        offset = (axes @ feet[..., None])[..., 0] - self.windows.centre[part]
+        A[:, :8] = (axes @ jacobians).reshape(frames, 8, n)
+        lower[:, :8] = (-slack - offset).reshape(frames, 8)
+        upper[:, :8] = (slack - offset).reshape(frames, 8)
+        used = np.zeros(shape, bool)
+        used[:, 8:] = np.arange(shape[1] - 8) < counts[:, None]
+        A[used] = np.concatenate([r.A for r in contacts])
+        lower[used] = np.concatenate([r.lower for r in contacts])
+        upper[used] = np.concatenate([r.upper for r in contacts])
+        stiffness[used] = _STIFFNESS[np.concatenate([r.kind for r in contacts])]
+        return A, Band(lower, upper, stiffness)
+
     def _slow_tips(
-        self, start: int, tips: np.ndarray, jacobians: np.ndarray
+        self, tips: np.ndarray, jacobians: np.ndarray, start: int
     ) -> tuple[np.ndarray, np.ndarray, Band]:
         """Speed limits of planted tips that are not anchored, between successive frames."""
         frames, n = len(tips), jacobians.shape[-1]
@@ -208,17 +240,3 @@ class ClipProgram:
         upper = np.where(slow, limit - steps, np.inf)
         flat = jacobians.reshape(frames, 4, n)
         return -flat[:-1], flat[1:], Band(lower, upper, _STIFFNESS[STANCE])
-
-
-def _padded(rows: list[Rows], n: int) -> tuple[np.ndarray, Band]:
-    """Rows of all frames as arrays of equal length."""
-    counts = np.array([len(r.lower) for r in rows])
-    shape = (len(rows), int(counts.max(initial=0)))
-    A, stiffness = np.zeros((*shape, n)), np.ones(shape)
-    lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
-    used = np.arange(shape[1]) < counts[:, None]
-    A[used] = np.concatenate([r.A for r in rows])
-    lower[used] = np.concatenate([r.lower for r in rows])
-    upper[used] = np.concatenate([r.upper for r in rows])
-    stiffness[used] = _STIFFNESS[np.concatenate([r.kind for r in rows])]
-    return A, Band(lower, upper, stiffness)

@@ -106,7 +106,9 @@ class ClipQP:
         """Cholesky factor of Hessian + valuesᵀ diag(weights) values, banded, for ``dpbtrs``."""
         frames, n = self.g.shape
         box, change, rows, pairs = self._split(weights)
-        blocks = self.H + np.swapaxes(self.A, 1, 2) @ (self.A * rows[..., None])
+        scaled = self.A * np.sqrt(rows)[..., None]
+        blocks = np.swapaxes(scaled, 1, 2) @ scaled
+        blocks += self.H
         diagonal = blocks.reshape(frames, n * n)[:, :: n + 1]
         diagonal += box
         diagonal[1:] += change

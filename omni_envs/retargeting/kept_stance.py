@@ -18,15 +18,15 @@ TIP, HEART = 0, 1
 _SLID = 3.0  # tolerances: an anchored tip that left its window this far was forced to
 
 
-def foot_points(robot: Robot, configuration: Kinematics) -> Points:
-    """Toe tip and heart of the sole of the left foot, then of the right."""
+def foot_points(robot: Robot) -> tuple[list[str], np.ndarray]:
+    """Bodies and (4, 3) offsets of toe tip and heart of the left foot, then of the right."""
     bodies, offsets = [], []
     for side in SIDES:
         foot = robot.feet[side]
         sole = np.array(foot.sole)
         bodies += [foot.body] * 2
         offsets += [sole[-1], sole[:-1].mean(axis=0) if len(sole) > 1 else sole[-1]]
-    return Points(configuration.model, bodies, offsets)
+    return bodies, np.array(offsets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +92,12 @@ class KeptStance(RowLimit):
 
     Args:
         windows: Windows of the clip.
-        points: Points of ``foot_points``.
+        configuration: Kinematics of the robot.
     """
 
-    def __init__(self, windows: StanceWindows, points: Points) -> None:
-        self._windows, self._points = windows, points
+    def __init__(self, windows: StanceWindows, configuration: Kinematics) -> None:
+        self._windows = windows
+        self._points = Points(configuration.model, *foot_points(configuration.robot))
         self._t = 0
         self._previous: np.ndarray | None = None
 

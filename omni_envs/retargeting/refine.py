@@ -3,8 +3,8 @@
 The frame-by-frame pass cannot see ahead, so contacts that come and go make it jerk. Here a few
 rounds of sequential quadratic programming move all frames at once (``clip_program``,
 ``interior_point``), each within a smaller box about the last motion. What linearisation leaves
-violated is restored on true distances, frame after frame, with speed limits about the restored frame
-before.
+violated is restored on true distances, frame after frame, with speed limits about the restored
+frame before.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.qp import StepQP, step_bounds, step_rows
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
-from omni_envs.robots import Robot, get_robot
+from omni_envs.robots import KEYPOINTS, Robot, get_robot
 
 # Frames solved at once, and frames on either side that are solved with them and thrown away: the
 # influence of a frame has faded there.
@@ -45,7 +45,7 @@ class RefineOptions:
     """
 
     acceleration_weight: float = 5e-6
-    radii: tuple[float, ...] = (0.2, 0.07, 0.025)
+    radii: tuple[float, ...] = (0.2, 0.07, 0.02, 0.005)
     tolerance: float = 1e-6
 
     def __post_init__(self) -> None:
@@ -99,12 +99,14 @@ def refine(
 
     restoration = _Restoration(program, robot, retargeted.options)
     qpos = qpos.copy()
-    energy, steps, violations = np.empty(frames), np.empty(frames, int), np.empty((frames, 3))
+    steps, violations = np.empty(frames, int), np.empty((frames, 3))
+    keypoints = np.empty((frames, len(KEYPOINTS), 3))
     for t in range(frames):
         qpos[t], steps[t], violations[t] = restoration.restore(t, qpos[t])
-        energy[t] = program.mesh.energy(program.configuration)
+        keypoints[t] = program.configuration.keypoints()
         if progress is not None:
             progress(done + t + 1, total)
+    energy = program.mesh.energy(keypoints)
     record = _record(retargeted, energy, steps, violations, perf_counter() - begin)
     return replace(retargeted, qpos=qpos, frames=record)
 
