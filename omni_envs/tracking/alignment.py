@@ -77,13 +77,12 @@ class Alignment(NamedTuple):
     def angle(self, q: Array, reference: Array) -> Array:
         """Returns (N, B) angles between orientations q and q' of (N, B, 4) arrays, rad.
 
-        <q, Δ r> = c <q, r> + s <q, k r> with k r = (-r_z, -r_y, r_x, r_w).
+        <q, Δ r> = c <q, r> + s <q, k r> with k = (0, 0, 0, 1).
         """
-        xp = array_namespace(q)
-        turned = q * xp.flip(reference, (-1,))
-        k = turned[..., 2] + turned[..., 3] - turned[..., 0] - turned[..., 1]
         c, s = self.half_cosine[:, None], self.half_sine[:, None]
-        return quaternion.angle_of_dot(c * dot(q, reference) + s * k)
+        return quaternion.angle_of_dot(
+            c * dot(q, reference) + s * quaternion.dot_turned(q, reference)
+        )
 
     def _rotation(self) -> tuple[Array, Array]:
         c, s = self.half_cosine, self.half_sine

@@ -57,6 +57,7 @@ _PRODUCT_CONJUGATE = _PRODUCT * np.tile(_CONJUGATE, 4)[:, None]
 _CONJUGATE_PRODUCT = _PRODUCT * np.repeat(_CONJUGATE, 4)[:, None]
 _ROT6D = _MATRIX[:, [0, 1, 3, 4, 6, 7]]
 _TABLES = {
+    "turned": np.array([-1.0, -1.0, 1.0, 1.0]),
     "product": _PRODUCT,
     "product_conjugate": _PRODUCT_CONJUGATE,
     "conjugate_product": _CONJUGATE_PRODUCT,
@@ -112,12 +113,19 @@ def rot6d(q: Array) -> Array:
 
 def rotate(q: Array, v: Array) -> Array:
     """Rotates (…, 3) vectors."""
-    return array_namespace(q).sum(matrix(q) * v[..., None, :], axis=-1)
+    return (matrix(q) @ v[..., None])[..., 0]
 
 
 def rotate_inverse(q: Array, v: Array) -> Array:
     """Rotates (…, 3) vectors by the inverse rotations: world coordinates → body coordinates."""
-    return array_namespace(q).sum(matrix(q) * v[..., :, None], axis=-2)
+    return (v[..., None, :] @ matrix(q))[..., 0, :]
+
+
+def dot_turned(a: Array, b: Array) -> Array:
+    """Returns the inner products <a, k ⊗ b> with k = (0, 0, 0, 1), half a turn about z."""
+    xp = array_namespace(a)
+    # k ⊗ b = (-b_z, -b_y, b_x, b_w).
+    return (a * xp.flip(b, (-1,))) @ _table("turned", xp, a.dtype, a.device)
 
 
 def angle(a: Array, b: Array) -> Array:
