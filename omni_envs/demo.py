@@ -135,7 +135,7 @@ def _make_reference(out: Path, console: Console, quiet: bool) -> Reference:
 
 def _proof(reference: Reference) -> str:
     assert reference.report is not None
-    figures = reference.report.summary()
+    figures: dict[str, Any] = dict(reference.report.summary())
     return (
         f"{figures['frames']} frames at {figures['fps']:.0f} fps; "
         f"penetration {1e3 * figures['penetration_max_m']:.2f} mm at most, "
