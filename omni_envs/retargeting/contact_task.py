@@ -64,7 +64,7 @@ class ContactTask(CostTask):
 
 
 def _ramps(touching: np.ndarray) -> np.ndarray:
-    """(links, T) weight in [0, 1]: rises and falls within each contact, so that no pull is sudden."""
+    """(links, T) weight in [0, 1] that rises and falls within each contact: no pull is sudden."""
     ramps = np.zeros(touching.shape)
     for ramp, flags in zip(ramps, touching, strict=True):
         edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))

@@ -61,13 +61,16 @@ class FrameSolver:
         self.solver = solver
         self.options = options
 
-    def solve(self, q: np.ndarray, iterations: int, radius: float) -> FrameResult:
+    def solve(
+        self, q: np.ndarray, iterations: int, radius: float, convergence: float
+    ) -> FrameResult:
         """Minimises the tasks from a starting configuration, then restores feasibility.
 
         Args:
             q: (nq,) start.
             iterations: Most steps.
             radius: Trust region of a step.
+            convergence: Stop when the predicted cost changes relatively less.
         """
         configuration, soft, steps = self.configuration, False, 0
         configuration.update(q)
@@ -81,7 +84,7 @@ class FrameSolver:
             configuration.update(configuration.step(dq))
             steps += 1
             last, predicted = predicted, before + qp.decrease(dq)
-            if not soft and abs(predicted - last) <= self.options.convergence * abs(predicted):
+            if not soft and abs(predicted - last) <= convergence * abs(predicted):
                 break
         repairs, violations, repair_soft = self._restore()
         q = configuration.data.qpos.copy()

@@ -52,7 +52,7 @@ class Kinematics(mink.Configuration):
         self_distance: float | None = 0.02,
     ) -> None:
         self.robot = robot
-        self._memory = {}
+        self._memory: dict[str, np.ndarray] = {}
         super().__init__(_compile(robot, scene, contact_distance, self_distance))
         model = self.model
         self.ancestors = ancestor_mask(model)
@@ -96,7 +96,7 @@ class Kinematics(mink.Configuration):
 
     def update(self, q: np.ndarray | None = None) -> None:
         """Moves to the (nq,) configuration q; forgets what was computed at the last one."""
-        self._memory: dict[str, np.ndarray] = {}
+        self._memory = {}
         super().update(q)
 
     def positions(self, points: Points) -> np.ndarray:

@@ -48,7 +48,8 @@ from omni_envs.robots import KEYPOINTS, SIDES, Robot
 # Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
 # step.
 _RELAXED = 2e-4
-_STRIDE = 5
+_STRIDE = 5  # frames between those that the plan of footholds is made from
+_FIRST = 1e-6  # convergence on the first frame: whatever is left there drifts into the motion
 
 
 def retarget(
@@ -72,7 +73,7 @@ def retarget(
         The robot motion at the source's fps.
 
     Raises:
-        InvalidDataError: The source is not finite, or has no frames.
+        InvalidDataError: The source is not finite, has no frames or no frame rate.
     """
     options = options or RetargetOptions()
     _check(source)
@@ -131,6 +132,8 @@ def _check(source: SourceMotion) -> None:
     owner = f"SourceMotion {source.name!r}"
     if source.num_frames < 1:
         raise InvalidDataError(owner, "keypoints", "at least one frame", "0 frames")
+    if not (np.isfinite(source.fps) and source.fps > 0):
+        raise InvalidDataError(owner, "fps", "positive", str(source.fps))
     for name in ("keypoints", "object_poses", "source_object_poses"):
         array = getattr(source, name)
         if array is not None and not np.isfinite(array).all():
@@ -177,7 +180,7 @@ class _Retargeter:
         )
 
     def run(self, progress: ProgressCallback | None) -> Retargeted:
-        frames = self.source.num_frames
+        frames, options = self.source.num_frames, self.options
         qpos = np.empty((frames, self.robot.nq))
         energy, seconds = np.empty(frames), np.empty(frames)
         iterations = np.empty(frames, int)
@@ -197,7 +200,12 @@ class _Retargeter:
             foothold.set_frame(t)
             self.touch.set_frame(t)
             stance.hold(t)
-            result = self.solver.solve(previous, self.options.iterations, self.options.trust_region)
+            result = self.solver.solve(
+                previous,
+                options.iterations if t else options.first_iterations,
+                options.trust_region,
+                options.convergence if t else _FIRST,
+            )
             stance.record(self.configuration, t)
             previous = result.q
             qpos[t], iterations[t], violations[t] = result.q, result.iterations, result.violations
@@ -236,13 +244,16 @@ class _Retargeter:
             self.velocity.set_previous(None)
         best: FrameResult | None = None
         lowest = np.inf
+        options = self.options
         for pose in aligned_poses(self.configuration, self.source.keypoints[0]):
-            result = self.solver.solve(pose, self.options.first_iterations, np.inf)
+            result = self.solver.solve(
+                pose, options.first_iterations, 2 * options.trust_region, options.convergence
+            )
             energy = self.mesh.energy(self.configuration) + 1e3 * max(result.violations)
             if energy < lowest:
                 best, lowest = result, energy
         assert best is not None
-        return best
+        return self.solver.solve(best.q, options.first_iterations, options.trust_region, _FIRST)
 
     def _sketch(self) -> tuple[StancePlan, np.ndarray]:
         """Solves every few frames without stance, and plans the footholds near where the feet went.
@@ -262,9 +273,9 @@ class _Retargeter:
                 self.configuration.update(q)
             else:
                 self.smoothness.set_target(q)
-                q = self.solver.solve(
-                    q, self.options.iterations, _STRIDE * self.options.trust_region
-                ).q
+                options = self.options
+                radius = _STRIDE * options.trust_region
+                q = self.solver.solve(q, options.iterations, radius, options.convergence).q
             feet[i] = self.configuration.feet()[:, :, :2]
         wishes = foot_wishes(feet)
         # Between these frames the feet follow the human's toes: the offset changes slowly.

@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.robots import G1
+from omni_envs.scenes import Scene
+
+
+@pytest.fixture
+def configuration():
+    configuration = Kinematics(G1, Scene())
+    rng = np.random.default_rng(1)
+    q = G1.default_qpos.copy()
+    q[7:] += rng.normal(scale=0.2, size=29)
+    q[3:7] = [0.5, 0.5, -0.5, 0.5]
+    configuration.update(q)
+    return configuration
+
+
+def differentiate(configuration, quantity, step=1e-6):
+    q, nv = configuration.data.qpos.copy(), configuration.model.nv
+    columns = []
+    for i in range(nv):
+        dq = np.zeros(nv)
+        dq[i] = step
+        configuration.update(q)
+        ahead = configuration.step(dq)
+        behind = configuration.step(-dq)
+        configuration.update(ahead)
+        high = quantity(configuration).copy()
+        configuration.update(behind)
+        columns.append((high - quantity(configuration)) / (2 * step))
+    configuration.update(q)
+    return np.stack(columns, axis=-1)
+
+
+def test_keypoint_jacobians(configuration):
+    expected = differentiate(configuration, Kinematics.keypoints)
+    np.testing.assert_allclose(
+        np.moveaxis(configuration.keypoint_jacobians(), 0, 1), expected, atol=1e-7
+    )
+
+
+def test_feet_jacobians(configuration):
+    expected = differentiate(configuration, Kinematics.feet)[:, :, :2]
+    np.testing.assert_allclose(configuration.feet_jacobians(), expected, atol=1e-7)
+
+
+def test_wrench_rows_are_jacobians_along_a_direction(configuration):
+    body = configuration.model.body("left_knee_link").id
+    point, normal = np.array([[0.1, 0.2, 0.3]]), np.array([[0.0, 0.6, 0.8]])
+    jacobian = configuration.body_jacobians(np.array([body]), point)
+    row = configuration.wrench_rows(point, normal) * configuration.ancestors[body]
+    np.testing.assert_allclose(row[0], normal[0] @ jacobian[:, 0], atol=1e-12)
+
+
+def test_heart_of_the_sole_is_behind_the_tip_and_left_is_left(configuration):
+    configuration.update(G1.default_qpos)
+    feet = configuration.feet()
+    assert (feet[:, 1, 0] < -0.05).all()
+    np.testing.assert_allclose(feet[:, 2], [[0.0, 0.1, 0.0]] * 2, atol=1e-2)
+
+
+def test_difference_undoes_step(configuration):
+    dq = np.random.default_rng(2).normal(scale=0.1, size=configuration.model.nv)
+    np.testing.assert_allclose(configuration.difference(configuration.step(dq)), dq, atol=1e-12)
