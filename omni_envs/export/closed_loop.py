@@ -13,7 +13,7 @@ from omni_envs.training.network_policy import NetworkPolicy
 from omni_envs.training.onnx_policy import OnnxPolicy
 from omni_envs.training.rollout import Policy, play
 
-EPISODES = 4
+EPISODES, MAX_STEPS = 4, 250
 TOLERANCE = 1e-3
 
 
@@ -37,6 +37,8 @@ def closed_loop(
 ) -> ClosedLoop:
     """Plays the same randomized episodes with network and file, each in its own kind of action.
 
+    Episodes are cut after 250 control steps: contacts amplify the last digits of an action.
+
     Args:
         config: The run that they belong to.
         network: The network, in the environment as trained in.
@@ -55,7 +57,7 @@ def closed_loop(
     def returns(policy: Policy, is_file: bool) -> float:
         env = make_evaluation_env(config, EPISODES, file=is_file)
         try:
-            return float(play(env, policy, seed=seed).returns.mean())
+            return float(play(env, policy, seed=seed, max_steps=MAX_STEPS).returns.mean())
         finally:
             env.close()
 
