@@ -47,7 +47,7 @@ def trace_clip(
     start: int,
     stop: int,
     place: Callable[[int], None],
-    visit: Callable[[int], None],
+    visit: Callable[[int], None] | None = None,
 ) -> ClipKinematics:
     """Visits the frames [start, stop) of a motion and keeps what the points' Jacobians need.
 
@@ -70,7 +70,8 @@ def trace_clip(
         configuration.update(qpos[t])
         axes[i], centres[i] = data.cdof, data.subtree_com[root]
         origins[i], rotations[i] = data.xpos[points.bodies], data.xmat[points.bodies]
-        visit(t)
+        if visit is not None:
+            visit(t)
     offsets = rotations.reshape(count, -1, 3, 3) @ points.offsets[:, :, None]
     positions = origins + offsets[..., 0]
     return ClipKinematics(

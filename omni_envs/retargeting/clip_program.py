@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from omni_envs import rotations
@@ -9,6 +11,7 @@ from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.retargeting.clip_kinematics import ClipKinematics, trace_clip
 from omni_envs.retargeting.clip_qp import Band, ClipQP
 from omni_envs.retargeting.contact_limit import ContactLimit
+from omni_envs.retargeting.contact_task import ContactTask
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.kept_stance import (
     TIP,
@@ -21,6 +24,7 @@ from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, Rows
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.qp import step_rows
 from omni_envs.retargeting.stance_plan import stance_tiers
+from omni_envs.retargeting.tasks import Quadratic
 from omni_envs.robots import KEYPOINTS, Robot
 
 # Multipliers of these problems are mostly below 10: constraints that can be met are met to 10 µm.
@@ -28,7 +32,7 @@ _STIFFNESS = np.empty(3)
 _STIFFNESS[[STANCE, SELF, CONTACT]] = 1e6, 1e7, 1e7
 _RIDGE = 1e-6
 # Part of a speed limit that is left to the restoration of the true constraints.
-_RESERVE = 0.03
+_RESERVE = 0.005
 _K = len(KEYPOINTS)
 
 
@@ -48,8 +52,9 @@ def moved(qpos: np.ndarray, x: np.ndarray) -> np.ndarray:
 class ClipProgram:
     """The smoothness problem of one clip.
 
-    minimise Σ_t ½ w E_t + ½ w_v ‖v_t‖²_S + ½ w_a ‖v_{t+1} - v_t‖²_S + posture, v_t = q_{t+1} ⊖ q_t,
-    subject to the constraints of ``retarget``, stance relative to the motion that is refined.
+    minimise Σ_t ½ w E_t + ½ w_v ‖v_t‖²_S + ½ w_a ‖v_{t+1} - v_t‖²_S + contact + posture,
+    v_t = q_{t+1} ⊖ q_t, subject to the constraints of ``retarget``, with stance relative to the
+    motion that is refined.
 
     Args:
         source: What the motion follows.
@@ -79,6 +84,8 @@ class ClipProgram:
         self._posture_weight = np.zeros(robot.nv)
         for joint, weight in robot.posture_weights.items():
             self._posture_weight[6 + robot.joint_names.index(joint)] = weight
+        self._touching = options.contact_weight > 0
+        self._touch = ContactTask(source, self.configuration, options.contact_weight)
         metric = self.configuration.metric
         self._velocity_weight = options.smoothness_weight * metric
         self._acceleration_weight = acceleration_weight * source.fps**4 * metric
@@ -114,8 +121,19 @@ class ClipProgram:
             radius: Half width of the box about the motion.
         """
         contacts: list[Rows] = []
-        trace = self._trace(qpos, start, stop, contacts)
+        touches: list[Quadratic | None] = []
+
+        def visit(t: int) -> None:
+            contacts.append(step_rows(self.configuration, [self.contact]))
+            self._touch.set_frame(t if self._touching else None)
+            touches.append(self._touch.quadratic(self.configuration))
+
+        trace = self._trace(qpos, start, stop, visit)
         H, g = self._objective(trace, start)
+        for i, model in enumerate(touches):
+            if model is not None:
+                H[i] += model.H
+                g[i] += model.g
         D, E = self._add_smoothness(H, g, qpos, start)
         frames, n = g.shape
         feet = trace.positions[:, _K:, :2].reshape(frames, 2, 2, 2)
@@ -127,14 +145,9 @@ class ClipProgram:
         return ClipQP(H, g, D, E, box, change, rows, A, pairs, B, C)
 
     def _trace(
-        self, qpos: np.ndarray, start: int, stop: int, contacts: list[Rows] | None = None
+        self, qpos: np.ndarray, start: int, stop: int, visit: Callable[[int], None] | None = None
     ) -> ClipKinematics:
-        """Keypoints and feet of the frames; on request appends the contact rows of each."""
-
-        def visit(t: int) -> None:
-            if contacts is not None:
-                contacts.append(step_rows(self.configuration, [self.contact]))
-
+        """Keypoints and feet of the frames; ``visit`` is called at each."""
         return trace_clip(self.configuration, self._points, qpos, start, stop, self.place, visit)
 
     def _objective(self, trace: ClipKinematics, start: int) -> tuple[np.ndarray, np.ndarray]:

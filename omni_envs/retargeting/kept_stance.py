@@ -15,6 +15,8 @@ from omni_envs.robots import SIDES, Robot
 TIP, HEART = 0, 1
 """Held points of a foot: the toe tip, and the heart of the sole, the mean of all other points."""
 
+_FLAT = 5e-3  # m: where the heart of an anchored sole moves less, the foot does not roll
+_LANDING = 5e-4  # m: how far from its window a foot may land
 _SLID = 3.0  # tolerances: an anchored tip that left its window this far was forced to
 
 
@@ -73,13 +75,11 @@ def stance_windows(
             x, y = arm / max(float(np.hypot(*arm)), 1e-9)
             turned = np.array([[x, y], [-y, x]]) if np.hypot(x, y) > 0.5 else np.eye(2)
             places = feet[run, foot] @ turned.T
-            low, high = places.min(axis=0), places.max(axis=0)
-            half = 0.5 * (high - low)
-            axes[run, foot], centre[run, foot] = turned, 0.5 * (low + high)
-            # A tip that slid slides no further; half the tolerance is left to the restoration.
-            slid = half[TIP] > _SLID * options.tolerance
-            slack[run, foot, TIP] = np.where(slid, half[TIP], 0.5 * options.tolerance)
-            slack[run, foot, HEART] = np.maximum(half[HEART], options.tolerance)
+            axes[run, foot] = turned
+            centre[run, foot, TIP], slack[run, foot, TIP] = _tip_window(places[:, TIP], options)
+            centre[run, foot, HEART], slack[run, foot, HEART] = _heart_window(
+                places[:, HEART], options
+            )
     planted = tiers >= LOOSE
     slow = np.zeros(tiers.shape, bool)
     slow[1:] = planted[1:] & planted[:-1] & ~((tiers[1:] == ANCHORED) & (tiers[:-1] == ANCHORED))
@@ -87,8 +87,34 @@ def stance_windows(
     return StanceWindows(axes, centre, slack, slow, float(step))
 
 
+def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
+    """Centre and half widths about (F, 2) places of a tip, half the tolerance left for later."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    half = 0.5 * (high - low)
+    slid = half > _SLID * options.tolerance
+    return 0.5 * (low + high), np.where(slid, half, 0.5 * options.tolerance)
+
+
+def _heart_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
+    """(F, 2) centres and half widths about the places of a heart: what it did since the start."""
+    moved = places - places[0]
+    low, high = moved.min(axis=0), moved.max(axis=0)
+    corner = float(np.linalg.norm(np.maximum(-low, high)))
+    if 0.0 < corner < _FLAT:
+        # Nowhere in the window is further from the start than the heart was.
+        part = np.linalg.norm(moved, axis=1).max() / corner
+        low, high = part * low, part * high
+    half = np.repeat(np.maximum(0.5 * (high - low), options.tolerance)[None], len(places), axis=0)
+    centre = np.repeat((places[0] + 0.5 * (low + high))[None], len(places), axis=0)
+    centre[0], half[0] = places[0], options.tolerance
+    return centre, half
+
+
 class KeptStance(RowLimit):
-    """Windows of both feet on one frame of a clip.
+    """Windows of both feet on one frame of a clip, for frames that are solved one after the other.
+
+    Where a foot lands a little beside its window, which a limited speed may force it to, the
+    windows of that stance move with it.
 
     Args:
         windows: Windows of the clip.
@@ -98,43 +124,49 @@ class KeptStance(RowLimit):
     def __init__(self, windows: StanceWindows, configuration: Kinematics) -> None:
         self._windows = windows
         self._points = Points(configuration.model, *foot_points(configuration.robot))
-        self._t = 0
-        self._previous: np.ndarray | None = None
+        self._t, self._tips = 0, np.zeros((2, 2))
+        self._landing, self._shift = np.zeros(2, bool), np.zeros((2, 2))
 
-    def set_frame(self, t: int, previous: np.ndarray | None) -> None:
-        """Chooses frame t.
+    def hold(self, t: int) -> None:
+        """Chooses frame t. ``record`` must have been called on frame t - 1."""
+        anchored = np.isfinite(self._windows.slack[:, :, TIP, 0])
+        self._t = t
+        self._landing = anchored[t] & (~anchored[t - 1] if t > 0 else True)
+        self._shift[self._landing] = 0.0
 
-        Args:
-            t: The frame.
-            previous: (2, 2) horizontal tips on the frame before; None leaves slow tips free.
-        """
-        self._t, self._previous = t, previous
-
-    def tips(self, configuration: Kinematics) -> np.ndarray:
-        """(2, 2) horizontal toe tips."""
-        return configuration.positions(self._points).reshape(2, 2, 3)[:, TIP, :2]
+    def record(self, configuration: Kinematics) -> None:
+        """Remembers where the frame has put the feet."""
+        places = configuration.positions(self._points).reshape(2, 2, 3)[..., :2]
+        offset, slack = self._offsets(places)[:, TIP], self._windows.slack[self._t, :, TIP]
+        beside = offset - np.clip(offset, -slack, slack)
+        self._shift[self._landing] = np.clip(beside, -_LANDING, _LANDING)[self._landing]
+        self._tips = places[:, TIP]
 
     def rows(self, configuration: Kinematics) -> Rows | None:
-        """Returns two rows for every held point."""
+        """Returns rows for the windows and for the steps of slow tips."""
         t, windows = self._t, self._windows
-        held = np.isfinite(windows.slack[t])
-        slow = windows.slow[t] if self._previous is not None else np.zeros(2, bool)
+        slow = windows.slow[t] if t > 0 else np.zeros(2, bool)
+        slack = windows.slack[t] + np.where(self._landing, _LANDING, 0.0)[:, None, None]
+        held = np.isfinite(slack)
         if not (held.any() or slow.any()):
             return None
         places = configuration.positions(self._points)
         jacobian = configuration.jacobians(self._points, places)[:2]
         places = places[:, :2].reshape(2, 2, 2)
-        jacobian = np.moveaxis(jacobian, 0, 1).reshape(2, 2, 2, -1)
-        axes = windows.axes[t][:, None]
-        offset = (axes @ places[..., None])[..., 0] - windows.centre[t]
-        A = [(axes @ jacobian)[held], jacobian[slow, TIP].reshape(-1, jacobian.shape[-1])]
-        lower, upper = (
-            [-windows.slack[t][held] - offset[held]],
-            [windows.slack[t][held] - offset[held]],
+        jacobian = jacobian.transpose(1, 0, 2).reshape(2, 2, 2, -1)
+        offset = self._offsets(places)[held]
+        moved = (places[slow, TIP] - self._tips[slow]).ravel()
+        A = np.concatenate(
+            [
+                (windows.axes[t][:, None] @ jacobian)[held],
+                jacobian[slow, TIP].reshape(-1, jacobian.shape[-1]),
+            ]
         )
-        if slow.any() and self._previous is not None:
-            moved = (places[slow, TIP] - self._previous[slow]).ravel()
-            lower.append(-windows.step - moved)
-            upper.append(windows.step - moved)
-        low = np.concatenate(lower)
-        return Rows(np.concatenate(A), low, np.concatenate(upper), np.full(len(low), STANCE))
+        lower = np.concatenate([-slack[held] - offset, -windows.step - moved])
+        upper = np.concatenate([slack[held] - offset, windows.step - moved])
+        return Rows(A, lower, upper, np.full(len(lower), STANCE))
+
+    def _offsets(self, places: np.ndarray) -> np.ndarray:
+        """(2, 2, 2) offsets of (2, 2, 2) places from the centres of their windows."""
+        axes, centre = self._windows.axes[self._t][:, None], self._windows.centre[self._t]
+        return (axes @ places[..., None])[..., 0] - centre - self._shift[:, None]

@@ -152,7 +152,6 @@ class _Restoration:
             self._velocity = StepVelocityLimit(robot, program.source.fps, options.velocity_limits)
             self._bounds.append(self._velocity)
         self._previous: np.ndarray | None = None
-        self._tips: np.ndarray | None = None
 
     def restore(self, t: int, q: np.ndarray) -> tuple[np.ndarray, int, tuple[float, ...]]:
         """Restores frame t after frame t - 1.
@@ -164,7 +163,7 @@ class _Restoration:
         program, configuration = self._program, self._program.configuration
         program.place(t)
         configuration.update(q)
-        program.stance.set_frame(t, self._tips)
+        program.stance.hold(t)
         if self._velocity is not None:
             self._velocity.set_previous(self._previous)
         metric, zero = configuration.metric, np.zeros(configuration.model.nv)
@@ -183,8 +182,9 @@ class _Restoration:
             if last or max(left) <= self._options.restoration_tolerance:
                 break
             lower, upper = step_bounds(configuration, self._bounds)
-            dq, _ = solve_daqp(StepQP(np.diag(metric), zero, lower, upper, rows, metric, np.inf))
+            radius = self._options.trust_region
+            dq, _ = solve_daqp(StepQP(np.diag(metric), zero, lower, upper, rows, metric, radius))
             configuration.update(configuration.step(dq))
         self._previous = configuration.data.qpos.copy()
-        self._tips = program.stance.tips(configuration)
+        program.stance.record(configuration)
         return self._previous, step, left
