@@ -178,7 +178,7 @@ def _turns(
     steps: int,
     seconds: float,
 ) -> dict[str, float]:
-    """Lets environment and physics take turns; each returns its time for ``steps`` control steps."""
+    """Lets environment and physics take turns; each returns its time for ``steps`` steps."""
     ours: list[float] = []
     theirs: list[float] = []
     finish = time.perf_counter() + seconds

@@ -71,17 +71,21 @@ class Simulation:
         """Advances every simulation by a control step under ``ctrl``.
 
         Returns:
-            (N,) whether the simulation diverged. MuJoCo has then reset it to its initial state or
-            will do so: its state means nothing.
+            (N,) whether the simulation diverged. It is then back in the state before this step.
         """
         for kept, now in zip(self._before, (self.qpos, self.qvel, self._warmstart), strict=True):
             np.copyto(kept, now)
         self.batch.step(nstep=self._substeps)
-        self._kinematics.update(self.qpos, self.qvel)
+        # MuJoCo resets a simulation that blew up without a word, and only counts a warning.
         diverged = self.batch.warning[:, _BAD_STATE, 1].any(axis=1)
         # Written so that NaN counts as diverged.
         diverged |= ~(np.abs(self.qvel).max(axis=1) < SPEED_LIMIT)
-        self._diverged |= diverged
+        diverged |= ~np.isfinite(self.qpos).all(axis=1)
+        if diverged.any():
+            self.qpos[diverged], self.qvel[diverged] = (a[diverged] for a in self._before[:2])
+            self._warmstart[diverged] = 0.0
+            self._diverged |= diverged
+        self._kinematics.update(self.qpos, self.qvel)
         return diverged
 
     def reset(

@@ -20,7 +20,7 @@ from omni_envs.envs.references import ReferenceLike, common_scene, resolve_refer
 from omni_envs.envs.simulation import Simulation
 from omni_envs.envs.task import TrackingTask
 from omni_envs.envs.variants import ModelVariants
-from omni_envs.errors import InvalidDataError, InvalidOptionError
+from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
 from omni_envs.robots import Robot, get_robot
 from omni_envs.tracking.config import (
     ActionConfig,
@@ -35,6 +35,9 @@ from omni_envs.tracking.config import (
 from omni_envs.tracking.motion import Frames, MotionLibrary
 from omni_envs.tracking.motion_sampling import MotionSampler
 from omni_envs.tracking.randomization import push, start_state
+
+RESET_OPTIONS = ("reset_mask", "motion", "frame")
+"""Options of ``reset``."""
 
 Observation = np.ndarray | dict[str, np.ndarray]
 Options = Mapping[str, Any]
@@ -208,9 +211,10 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self._np_random, self._np_random_seed = seeding.np_random(int(value))
             self.sampler.reset()
             self._gate.reset()
-        options = {
-            k: v for k, v in (options or {}).items() if k in ("reset_mask", "motion", "frame")
-        }
+        options = dict(options or {})
+        for name in options:
+            if name not in RESET_OPTIONS:
+                raise UnknownNameError("reset option", name, RESET_OPTIONS)
         mask = options.pop("reset_mask", None)
         if mask is None:
             ids = np.arange(self.num_envs)

@@ -78,5 +78,38 @@ def test_an_explosion_is_noticed(make, monkeypatch, tmp_path):
     env.reset(seed=0)
     env.simulation.qvel[1] = 1e12
     assert env.simulation.step().tolist() == [False, True, False]
-    before = env.simulation.before(1)
-    assert before["qvel"] == pytest.approx(1e12)
+    assert env.simulation.before(1)["qvel"] == pytest.approx(1e12)
+    assert env.simulation.step().tolist() == [False, True, False]  # until it is reset
+    env.reset(seed=0)
+    assert not env.simulation.step().any()
+
+
+def test_a_simulation_that_blows_up_in_the_last_substep_leaves_no_nan(make, monkeypatch):
+    env = make(2)
+    env.reset(seed=0)
+    simulation = env.simulation
+    state = simulation.qpos[1].copy()
+    real = simulation.batch.step
+
+    def step(**arguments):
+        real(**arguments)
+        simulation.qpos[1], simulation.qvel[1] = np.nan, np.inf
+
+    monkeypatch.setattr(simulation, "batch", Spoilt(simulation.batch, step))
+    observations, _, terminated, _, infos = env.step(np.zeros((2, 29)))
+    assert infos["diverged"].tolist() == [False, True]
+    assert terminated[1]
+    assert np.isfinite(observations).all()
+    assert np.isfinite(infos["final_obs"][1]).all()
+    assert np.isfinite(infos["error/body_position"]).all()
+    np.testing.assert_array_equal(env.divergences[0].qpos, state)
+
+
+class Spoilt:
+    """A batch whose step ends badly."""
+
+    def __init__(self, batch, step):
+        self.step, self._batch = step, batch
+
+    def __getattr__(self, name):
+        return getattr(self._batch, name)

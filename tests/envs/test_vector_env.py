@@ -132,6 +132,18 @@ def test_bad_masks(make):
             env.reset(options={"reset_mask": np.array(mask)})
 
 
+def test_reset_options_that_do_not_exist_are_refused(make):
+    with pytest.raises(UnknownNameError, match=r"reset option 'start'.*frame, motion, reset_mask"):
+        make().reset(options={"start": 3})
+
+
+def test_an_empty_mask_changes_nothing(make):
+    env = make(autoreset_mode="DISABLED")
+    before, _ = env.reset(seed=0)
+    after, _ = env.reset(options={"reset_mask": np.zeros(4, bool)})
+    np.testing.assert_array_equal(after, before)
+
+
 def test_truncation_at_the_end_of_the_motion(make, quiet):
     # Held on the reference by nothing but generous tests.
     never = {"anchor_height": None, "anchor_tilt": None, "end_effector_height": None}
@@ -391,3 +403,41 @@ def test_memory_does_not_grow(make):
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
     assert grown < 100_000
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"physics": "fast"},
+        {"reward": {"contact_rule": "substeps"}},
+        {"reward": {"contact_rule": "any"}},
+        {"preset": "beyondmimic"},
+        {"randomization": {"object": None}},
+        {"reset": {"start": "adaptive"}},
+        {"reset": {"start": "start"}},
+    ],
+    ids=str,
+)
+def test_other_options_run(make, options):
+    env = make(**options)
+    env.reset(seed=0)
+    for action in ACTIONS[:15]:
+        observations, reward, *_ = env.step(action)
+        assert np.isfinite(observations).all()
+        assert np.isfinite(reward).all()
+        assert (reward <= 7.0 * 0.02 + 1e-9).all()
+
+
+def test_resting_on_the_knee_costs_only_under_the_rule_any(make, quiet):
+    """A lying robot: every contact counts for BeyondMimic, none for OmniRetarget."""
+    never = {"anchor_height": None, "anchor_tilt": None, "end_effector_height": None}
+    penalties = {}
+    for rule in ("self", "any"):
+        env = make(1, **quiet, reward={"contact_rule": rule}, termination=never)
+        env.reset(seed=0, options={"frame": 0})
+        env.simulation.qpos[0, :7] = [0, 0, 0.2, np.sqrt(0.5), 0, np.sqrt(0.5), 0]
+        for _ in range(25):
+            infos = env.step(np.zeros((1, 29)))[4]
+        penalties[rule] = infos["reward/contact"][0]
+    assert penalties["self"] == 0
+    assert penalties["any"] <= -2 * 0.1 * 0.02
