@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from omni_envs.errors import InvalidDataError, UnknownNameError
 from omni_envs.robots.g1 import G1
+from omni_envs.robots.h1 import H1
 from omni_envs.robots.robot import Robot
+from omni_envs.robots.t1 import T1
 
-_ROBOTS: dict[str, Robot] = {G1.name: G1}
+_ROBOTS: dict[str, Robot] = {robot.name: robot for robot in (G1, H1, T1)}
 
 
 def robot_names() -> tuple[str, ...]:
