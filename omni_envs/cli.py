@@ -78,6 +78,12 @@ class Retarget:
     fps: float = 50.0
     """Frames per second of the reference."""
 
+    solver: Literal["daqp", "clarabel"] = "daqp"
+    """Solver of the frame-by-frame pass; clarabel takes the trust region as a cone."""
+
+    refine: bool = True
+    """Smooth the whole clip under the same constraints after the frame-by-frame pass."""
+
     json: bool = False
     """Print JSON."""
 
@@ -85,6 +91,7 @@ class Retarget:
         from omni_envs.demonstrations import load_demonstration
         from omni_envs.progress import progress_bar
         from omni_envs.references import make_reference
+        from omni_envs.retargeting import RetargetOptions
         from omni_envs.robots import get_robot
 
         robot = get_robot(self.robot)
@@ -93,7 +100,13 @@ class Retarget:
             self.source, object_mesh=self.object, terrain_mesh=self.terrain, height=self.height
         )
         with progress_bar("Retargeting", disable=self.json) as progress:
-            reference = make_reference(demonstration, robot, fps=self.fps, progress=progress)
+            reference = make_reference(
+                demonstration,
+                robot,
+                fps=self.fps,
+                options=RetargetOptions(solver=self.solver, refine=self.refine),
+                progress=progress,
+            )
         reference.save(self.out)
         rows = {**_summary(reference), **_speed(reference)}
         _show(f"{demonstration.name} → {robot.title}: {self.out}", rows, self.json)

@@ -1,4 +1,4 @@
-"""From a demonstration to a reference: scale, resample, retarget, differentiate, evaluate."""
+"""From a demonstration to a reference: scale, resample, retarget, refine, evaluate."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from omni_envs.progress import ProgressCallback
 from omni_envs.references.key import content_hashes, reference_key, versions
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.reference import Reference
-from omni_envs.retargeting import RetargetOptions, retarget
+from omni_envs.retargeting import RetargetOptions, refine, retarget
 from omni_envs.robots import Robot, get_robot
 
 STANCE = "default"
@@ -46,7 +46,10 @@ def make_reference(
     # The source is resampled, not the result: so the retargeter holds every constraint on every
     # frame of the reference, and interpolation cannot break one.
     source = resample_source(scale_demonstration(demonstration, robot.height), fps)
-    motion = retarget(source, robot, options, progress)
+    passes = 2 if options.refine else 1
+    motion = retarget(source, robot, options, _share(progress, source.num_frames, 0, passes))
+    if options.refine:
+        motion = refine(motion, progress=_share(progress, source.num_frames, 1, passes))
     report = evaluate(
         robot,
         motion.source.scene,
@@ -80,6 +83,19 @@ def make_reference(
             "solve_seconds": float(motion.frames.seconds.sum()),
         },
     )
+
+
+def _share(
+    progress: ProgressCallback | None, frames: int, number: int, passes: int
+) -> ProgressCallback | None:
+    """One of several passes over all frames, on a bar that counts frames once."""
+    if progress is None:
+        return None
+
+    def update(done: int, total: int) -> None:
+        progress(int(frames * (number + done / total) / passes), frames)
+
+    return update
 
 
 def evaluate_reference(reference: Reference) -> ReferenceReport:

@@ -2,6 +2,7 @@
 
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.options import RetargetOptions, StanceOptions
+from omni_envs.retargeting.refine import refine
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.retarget import deformation_energy, retarget
 
@@ -13,5 +14,6 @@ __all__ = [
     "SolveRecord",
     "StanceOptions",
     "deformation_energy",
+    "refine",
     "retarget",
 ]

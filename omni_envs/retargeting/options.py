@@ -74,7 +74,8 @@ class RetargetOptions:
         restoration_tolerance: Violation that needs no repair, m.
         solver: ``"daqp"``, or ``"clarabel"``, which takes the trust region as a second-order cone.
         backend: ``"mink"``, or ``"placo"``: pinocchio's kinematics and placo's QP, to check with.
-        refine: Smooth the whole clip under the same constraints after the frame-by-frame pass.
+        refine: Whether references are smoothed as a whole after the frame-by-frame pass: see
+            ``refine``.
     """
 
     surface_points: int = 100
@@ -95,7 +96,7 @@ class RetargetOptions:
     restoration_tolerance: float = 2e-5
     solver: Solver = "daqp"
     backend: Backend = "mink"
-    refine: bool = False
+    refine: bool = True
 
     def __post_init__(self) -> None:
         _require(self.surface_points >= 8, "surface_points", "at least 8", self.surface_points)
