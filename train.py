@@ -60,6 +60,9 @@ class Arguments:
     env_options: str = "{}"
     """Options of the task as JSON, over those of the recipe."""
 
+    training_options: str = "{}"
+    """Options in training alone as JSON, over those of the recipe."""
+
     ppo: str = "{}"
     """Hyper-parameters as JSON, over those of the recipe."""
 
@@ -86,6 +89,7 @@ def make_config(arguments: Arguments) -> TrainConfig:
         arguments.out,
         num_envs=arguments.num_envs or None,
         env_options=_mapping("--env-options", arguments.env_options),
+        training_options=_mapping("--training-options", arguments.training_options),
         ppo=_mapping("--ppo", arguments.ppo),
         trainer=arguments.trainer,
         num_threads=arguments.num_threads,

@@ -1,9 +1,12 @@
+import dataclasses
 import json
+import shlex
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+import tyro
 
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("onnxruntime")
@@ -12,6 +15,7 @@ pytest.importorskip("matplotlib")
 from omni_envs.export import export_run
 from omni_envs.references import reference_from_qpos
 from omni_envs.robots import G1
+from omni_envs.training.config import TrainConfig
 from omni_envs.training.evaluate import evaluate_run
 from omni_envs.training.onnx_policy import OnnxPolicy
 
@@ -107,6 +111,15 @@ def test_bad_input_is_one_line_and_status_1(tmp_path, reference, capsys, more, m
     assert train.main(_words(tmp_path / "new", reference, *more)) == 1
     error = capsys.readouterr().err.strip()
     assert message in error and error.startswith("train.py: ") and "\n" not in error
+
+
+def test_the_command_in_the_sidecar_repeats_the_run(run):
+    command = json.loads((run / "policy.json").read_text())["command"]
+    words = shlex.split(command)
+    assert words[:2] == ["python", "train.py"]
+    config = TrainConfig.load(run)
+    again = train.make_config(tyro.cli(train.Arguments, args=words[2:]))
+    assert dataclasses.replace(again, num_threads=config.num_threads) == config
 
 
 def test_a_used_run_directory_is_refused(run, reference, capsys):

@@ -77,6 +77,7 @@ def export_run(
         "profile": profile,
         **description.sidecar(),
         "checks": figures,
+        "command": config.command(),
         "training": config.to_dict(),
     }
     sidecar.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -132,6 +133,26 @@ class TrainConfig:
             return cls(**{**data, "ppo": PPOConfig(**ppo)})
         except TypeError as error:
             raise InvalidOptionError(f"TrainConfig: {error}.") from error
+
+    def command(self) -> str:
+        """Returns the command that repeats this run."""
+        data = self.to_dict()
+        flags = {
+            "env": self.env,
+            "trainer": self.trainer,
+            "recipe": "published",
+            "steps": self.steps,
+            "time-limit": self.time_limit,
+            "num-envs": self.num_envs,
+            "seed": self.seed,
+            "episodes": self.evaluation_episodes,
+            "env-options": json.dumps(data["env_options"]),
+            "training-options": json.dumps(data["training_options"]),
+            "ppo": json.dumps(data["ppo"]),
+            "out": self.out,
+        }
+        words = [word for name, value in flags.items() for word in (f"--{name}", str(value))]
+        return shlex.join(["python", "train.py", *words])
 
     def save(self) -> Path:
         """Writes ``config.json`` into the run directory."""

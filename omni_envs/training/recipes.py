@@ -34,6 +34,7 @@ class Recipe:
         *,
         num_envs: int | None = None,
         env_options: Mapping[str, Any] | None = None,
+        training_options: Mapping[str, Any] | None = None,
         ppo: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> TrainConfig:
@@ -45,6 +46,7 @@ class Recipe:
             steps: Control steps to train for.
             num_envs: Simulations, by default the recipe's.
             env_options: Options of the task over the recipe's.
+            training_options: Options in training alone over the recipe's.
             ppo: Hyper-parameters over the recipe's.
             **more: Other fields of ``TrainConfig``.
 
@@ -57,18 +59,21 @@ class Recipe:
             "steps": steps,
             "num_envs": self.num_envs if num_envs is None else num_envs,
             "env_options": merged(self.env_options, env_options or {}),
-            "training_options": self.training_options,
+            "training_options": merged(self.training_options, training_options or {}),
             "ppo": {**asdict(self.ppo), **(ppo or {})},
             **more,
         }
         return TrainConfig.from_dict(data)
 
 
-_RESIDUAL = {"action": {"mode": "residual"}}
+# Actions are offsets from the reference; twice the published scale makes a step of the policy twice
+# as large. Little noise in them keeps the robot on its feet from the start.
+_RESIDUAL = {"action": {"mode": "residual", "scale": 2.0}}
+# Small rollouts: at a budget of minutes, more updates count more than better ones.
 _SMALL = PPOConfig(
     rollout_steps=16,
     learning_rate=3e-4,
-    desired_kl=0.0,
+    desired_kl=0.02,
     value_clip=0.0,
     hidden=(256, 128),
     initial_std=0.3,
@@ -77,13 +82,12 @@ _SMALL = PPOConfig(
 RECIPES: Mapping[str, Recipe] = {
     # BeyondMimic's: for thousands of simulations and 10⁸ steps and more.
     "published": Recipe(PPOConfig(), num_envs=4096),
-    # For a few cores and hours. Actions are offsets from the reference, little exploration noise
-    # keeps the robot on its feet from the start, and small rollouts give many updates per sample.
-    "small": Recipe(_SMALL, 128, _RESIDUAL),
-    # For a few cores and minutes: as above, and nothing is left to chance in training.
+    # For a few cores and hours.
+    "small": Recipe(_SMALL, 64, _RESIDUAL),
+    # For a few cores and minutes: nothing is left to chance in training, and physics are fast.
     "quick": Recipe(
         _SMALL,
-        128,
+        64,
         _RESIDUAL,
         {
             "observation": {"privileged": True, "noise": None},
