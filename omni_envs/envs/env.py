@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from omni_envs.envs.options import UnexpectedOptionError
-from omni_envs.envs.vector_env import Observation, OmniVectorEnv
+from omni_envs.envs.vector_env import RENDER_MODES, Observation, OmniVectorEnv
 from omni_envs.errors import InvalidDataError
 
 _OWN = ("num_envs", "num_threads", "autoreset_mode")
@@ -103,6 +103,9 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     Raises:
         OmniEnvsError: An option or reference is not valid; the message names it.
     """
+
+    # gymnasium.make reads the class before there is an instance.
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}  # noqa: RUF012
 
     def __init__(self, **options: Any) -> None:
         valid = [

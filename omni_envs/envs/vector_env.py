@@ -42,6 +42,8 @@ RESET_OPTIONS = ("reset_mask", "motion", "frame")
 Observation = np.ndarray | dict[str, np.ndarray]
 Options = Mapping[str, Any]
 
+RENDER_MODES = ("rgb_array",)
+
 
 class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     """N simulations of a robot that tracks a reference; see ``OmniEnv`` for spaces and rewards.
@@ -132,11 +134,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.num_envs, self.robot = num_envs, get_robot(robot)
         dt = config.physics.control_step
         self.metadata = {
-            "render_modes": ["rgb_array"],
+            "render_modes": list(RENDER_MODES),
             "render_fps": round(1 / dt),
             "autoreset_mode": self.autoreset_mode,
         }
-        if render_mode not in (None, *self.metadata["render_modes"]):
+        if render_mode not in (None, *RENDER_MODES):
             raise InvalidOptionError(
                 f"render_mode must be None or 'rgb_array'; got {render_mode!r}."
             )
