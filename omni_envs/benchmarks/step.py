@@ -16,8 +16,8 @@ from omni_envs import registration
 from omni_envs.envs import OmniVectorEnv
 from omni_envs.errors import UnknownNameError
 
-SLICE = 4
-"""Control steps per timed slice; environment and physics take turns."""
+PAIRS = 8
+"""Control steps, each done by the environment and by raw physics, that make one measurement."""
 
 NOISE = 0.2
 """Standard deviation of the actions about those that aim at the reference."""
@@ -38,8 +38,9 @@ def bench_step(
 
     The actions aim at the reference, with noise: episodes start all over it and last for about half
     a second. Raw physics is ``mujoco.batch``: ``step(nstep=substeps)`` with constant controls,
-    nothing read, on the same per-simulation models and started from the environment's states before
-    every slice. Slices of both take turns, so that whatever else the machine does hits both alike.
+    nothing read. It repeats every control step of the environment: same per-simulation models, same
+    states, same joint targets. The two take turns step by step, so that whatever else the machine
+    does hits both alike.
 
     Args:
         env: Environment id.
@@ -60,33 +61,28 @@ def bench_step(
     construct = time.perf_counter() - started
     rng = np.random.default_rng(seed)
     observations, _ = vector.reset(seed=seed)
-    step = vector.step
-    for _ in range(SLICE):
-        observations = step(_aim(vector, observations, rng))[0]
+    for _ in range(PAIRS):
+        observations = vector.step(_aim(vector, observations, rng))[0]
     memory = (_resident_bytes() - base) / num_envs
     live = vector.simulation.batch
     raw = Batch(vector.simulation.model, num_envs, live.nthread)
     substeps = vector.config.physics.substeps
 
-    def play() -> float:
+    def pair() -> tuple[float, float]:
         nonlocal observations
-        elapsed = 0.0
-        for _ in range(SLICE):
-            action = _aim(vector, observations, rng)
-            begun = time.perf_counter()
-            observations = step(action)[0]
-            elapsed += time.perf_counter() - begun
-        return elapsed
-
-    def load() -> None:
+        action = _aim(vector, observations, rng)
         vector.simulation.copy_models_to(raw)
         for name in _STATE:
             raw.bind(name)[:] = live.bind(name)
+        started = time.perf_counter()
+        observations = vector.step(action)[0]
+        ours = time.perf_counter() - started
+        raw.bind("ctrl")[:] = live.bind("ctrl")
+        started = time.perf_counter()
+        raw.step(nstep=substeps)
+        return ours, time.perf_counter() - started
 
-    def run() -> float:
-        return _timed(lambda: [raw.step(nstep=substeps) for _ in range(SLICE)])
-
-    figures = _turns(play, load, run, SLICE * num_envs, seconds)
+    figures = _measure(pair, num_envs, seconds)
     vector.close()
     return figures | {
         "bytes_per_env": round(memory),
@@ -116,30 +112,25 @@ def bench_single(
     vector: OmniVectorEnv = single.unwrapped.vector
     observation, _ = single.reset(seed=seed)
     simulation, substeps = vector.simulation, vector.config.physics.substeps
-    data = mujoco.MjData(simulation.model)
+    model, data = simulation.model, mujoco.MjData(simulation.model)
     rng = np.random.default_rng(seed)
 
-    def play() -> float:
+    def pair() -> tuple[float, float]:
         nonlocal observation
-        elapsed = 0.0
-        for _ in range(SLICE):
-            action = _aim(vector, observation[None], rng)[0]
-            begun = time.perf_counter()
-            observation, _, terminated, truncated, _ = single.step(action)
-            if terminated or truncated:
-                observation, _ = single.reset()
-            elapsed += time.perf_counter() - begun
-        return elapsed
-
-    def load() -> None:
+        action = _aim(vector, observation[None], rng)[0]
         for name in _STATE:
             getattr(data, name)[:] = simulation.batch.bind(name)[0]
+        started = time.perf_counter()
+        observation, _, terminated, truncated, _ = single.step(action)
+        if terminated or truncated:
+            observation, _ = single.reset()
+        ours = time.perf_counter() - started
+        data.ctrl[:] = simulation.ctrl[0]
+        started = time.perf_counter()
+        mujoco.mj_step(model, data, substeps)
+        return ours, time.perf_counter() - started
 
-    def run() -> float:
-        model = simulation.model
-        return _timed(lambda: [mujoco.mj_step(model, data, substeps) for _ in range(SLICE)])
-
-    return _turns(play, load, run, SLICE, seconds)
+    return _measure(pair, 1, seconds)
 
 
 def bench_humanoid(*, seconds: float = 5.0, seed: int = 0) -> dict[str, float]:
@@ -150,48 +141,37 @@ def bench_humanoid(*, seconds: float = 5.0, seed: int = 0) -> dict[str, float]:
     model, data = inner.model, mujoco.MjData(inner.model)
     rng = np.random.default_rng(seed)
 
-    def play() -> float:
-        elapsed = 0.0
-        for _ in range(SLICE):
-            action = rng.uniform(-0.4, 0.4, env.action_space.shape).astype(np.float32)
-            begun = time.perf_counter()
-            _, _, terminated, truncated, _ = env.step(action)
-            if terminated or truncated:
-                env.reset()
-            elapsed += time.perf_counter() - begun
-        return elapsed
-
-    def load() -> None:
+    def pair() -> tuple[float, float]:
+        action = rng.uniform(-0.4, 0.4, env.action_space.shape).astype(np.float32)
         for name in _STATE:
             getattr(data, name)[:] = getattr(inner.data, name)
+        started = time.perf_counter()
+        _, _, terminated, truncated, _ = env.step(action)
+        if terminated or truncated:
+            env.reset()
+        ours = time.perf_counter() - started
+        data.ctrl[:] = inner.data.ctrl
+        started = time.perf_counter()
+        mujoco.mj_step(model, data, inner.frame_skip)
+        return ours, time.perf_counter() - started
 
-    def run() -> float:
-        return _timed(lambda: [mujoco.mj_step(model, data, inner.frame_skip) for _ in range(SLICE)])
-
-    return _turns(play, load, run, SLICE, seconds)
+    return _measure(pair, 1, seconds)
 
 
-def _turns(
-    play: Callable[[], float],
-    load: Callable[[], None],
-    run: Callable[[], float],
-    steps: int,
-    seconds: float,
+def _measure(
+    pair: Callable[[], tuple[float, float]], steps: int, seconds: float
 ) -> dict[str, float]:
-    """Lets environment and physics take turns; each returns its time for ``steps`` steps."""
-    ours: list[float] = []
-    theirs: list[float] = []
+    """Repeats a pair of ``steps`` control steps each, by the environment and by raw physics."""
+    rows: list[np.ndarray] = []
     finish = time.perf_counter() + seconds
-    while time.perf_counter() < finish or len(ours) < 3:
-        load()
-        # Whoever goes first differs, so that neither always finds the caches warm.
-        for mine in (True, False) if len(ours) % 2 else (False, True):
-            (ours if mine else theirs).append(play() if mine else run())
+    while time.perf_counter() < finish or len(rows) < 3:
+        rows.append(np.sum([pair() for _ in range(PAIRS)], axis=0))
+    ours, raw = np.array(rows).T
     return {
-        "steps_per_s": steps / float(np.median(ours)),
-        "raw_steps_per_s": steps / float(np.median(theirs)),
-        "ratio": float(np.median(np.array(theirs) / np.array(ours))),
-        "slices": len(ours),
+        "steps_per_s": PAIRS * steps / float(np.median(ours)),
+        "raw_steps_per_s": PAIRS * steps / float(np.median(raw)),
+        "ratio": float(np.median(raw / ours)),
+        "measurements": len(rows),
     }
 
 
@@ -214,12 +194,6 @@ def _make(env: str, num_envs: int, num_threads: int, options: dict[str, Any]) ->
         raise UnknownNameError("environment", env, ids)
     made: Any = gymnasium.make_vec(env, num_envs=num_envs, num_threads=num_threads, **options)
     return made.unwrapped
-
-
-def _timed(call: Callable[[], Any]) -> float:
-    started = time.perf_counter()
-    call()
-    return time.perf_counter() - started
 
 
 def _resident_bytes() -> int:
