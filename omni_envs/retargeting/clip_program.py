@@ -99,7 +99,7 @@ class ClipProgram:
             [*(k.body for k in keypoints), *bodies],
             np.concatenate([[k.offset for k in keypoints], offsets]),
         )
-        feet = self._trace(qpos, 0, len(qpos)).positions[:, _K:, :2].reshape(-1, 2, 2, 2)
+        feet = self._trace(qpos, 0, len(qpos)).positions[:, _K:].reshape(-1, 2, 2, 3)
         tiers = stance_tiers(source, options.stance)
         self.windows = stance_windows(feet, tiers, source.fps, options.stance)
         self.stance = KeptStance(self.windows, self.configuration)
@@ -136,10 +136,10 @@ class ClipProgram:
                 g[i] += model.g
         D, E = self._add_smoothness(H, g, qpos, start)
         frames, n = g.shape
-        feet = trace.positions[:, _K:, :2].reshape(frames, 2, 2, 2)
-        jacobians = trace.jacobians[:, :2, _K:].transpose(0, 2, 1, 3).reshape(frames, 2, 2, 2, n)
-        A, rows = self._rows(contacts, feet, jacobians, start)
-        B, C, pairs = self._slow_tips(feet[:, :, TIP], jacobians[:, :, TIP], start)
+        feet = trace.positions[:, _K:].reshape(frames, 2, 2, 3)
+        jacobians = trace.jacobians[:, :, _K:].transpose(0, 2, 1, 3).reshape(frames, 2, 2, 3, n)
+        A, rows = self._rows(contacts, feet[..., :2], jacobians[..., :2, :], start)
+        B, C, pairs = self._tip_steps(feet[:, :, TIP], jacobians[:, :, TIP], start)
         box = self._box(qpos[start:stop, 7:], radius)
         change = self._change(qpos[start:stop, 7:], radius)
         return ClipQP(H, g, D, E, box, change, rows, A, pairs, B, C)
@@ -238,18 +238,16 @@ class ClipProgram:
         stiffness[used] = _STIFFNESS[np.concatenate([r.kind for r in contacts])]
         return A, Band(lower, upper, stiffness)
 
-    def _slow_tips(
+    def _tip_steps(
         self, tips: np.ndarray, jacobians: np.ndarray, start: int
     ) -> tuple[np.ndarray, np.ndarray, Band]:
-        """Speed limits of planted tips that are not anchored, between successive frames."""
+        """Limits on the steps of planted tips between successive frames."""
         frames, n = len(tips), jacobians.shape[-1]
-        slow = np.repeat(self.windows.slow[start + 1 : start + frames], 2, axis=1)
-        if not slow.any():
+        limit = self.windows.steps[start + 1 : start + frames].reshape(frames - 1, 6)
+        if not np.isfinite(limit).any():
             empty = np.zeros((frames - 1, 0))
             return np.zeros((frames - 1, 0, n)), np.zeros((frames - 1, 0, n)), Band(empty, empty)
-        steps = np.diff(tips, axis=0).reshape(frames - 1, 4)
-        limit = self.windows.step * (1.0 - _RESERVE)
-        lower = np.where(slow, -limit - steps, -np.inf)
-        upper = np.where(slow, limit - steps, np.inf)
-        flat = jacobians.reshape(frames, 4, n)
-        return -flat[:-1], flat[1:], Band(lower, upper, _STIFFNESS[STANCE])
+        steps = np.diff(tips, axis=0).reshape(frames - 1, 6)
+        limit = limit * (1.0 - _RESERVE)
+        flat = jacobians.reshape(frames, 6, n)
+        return -flat[:-1], flat[1:], Band(-limit - steps, limit - steps, _STIFFNESS[STANCE])

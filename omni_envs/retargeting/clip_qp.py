@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from scipy.linalg.lapack import dpbtrf
 
 from omni_envs.errors import OmniEnvsError
@@ -113,25 +114,25 @@ class ClipQP:
         diagonal += box
         diagonal[1:] += change
         diagonal[:-1] += change
+        below = np.zeros((frames, n, n))
         if self.B.size:
-            blocks[:-1] += np.swapaxes(self.B, 1, 2) @ (self.B * pairs[..., None])
-            blocks[1:] += np.swapaxes(self.C, 1, 2) @ (self.C * pairs[..., None])
+            B, C = np.swapaxes(self.B, 1, 2), np.swapaxes(self.C, 1, 2)
+            weighted = self.C * pairs[..., None]
+            blocks[:-1] += B @ (self.B * pairs[..., None])
+            blocks[1:] += C @ weighted
+            below[:-1] = B @ weighted  # transposed: column by column
+        below.reshape(frames, n * n)[:-1, :: n + 1] += self.D - change
 
-        # Row j of ``band`` holds column j of the matrix from its diagonal down: entry (i, j) of a
-        # block lies at i - j, of the block below it n further.
+        # LAPACK wants every column from its diagonal down, 2n + 1 long. Columns of whole blocks fit
+        # in there with a stride of 2n: what would lie above the diagonal lies where E belongs.
         depth = 2 * n + 1
         band = np.zeros((frames, n, depth))
-        flat = band.reshape(frames, n * depth)
-        i, j = np.tril_indices(n)
-        flat[:, j * depth + i - j] = blocks[:, i, j]
-        band[:-1, :, n] = self.D - change
+        size = band.itemsize
+        strides = (n * depth * size, 2 * n * size, size)
+        columns = as_strided(band, (frames, n, 2 * n), strides)
+        columns[..., :n] = blocks * np.tri(n).T
+        columns[..., n:] = below
         band[:-2, :, 2 * n] = self.E
-        coupled = np.flatnonzero(pairs.any(axis=1))
-        if len(coupled):
-            i, j = np.indices((n, n)).reshape(2, -1)
-            weighted = self.C[coupled] * pairs[coupled, :, None]
-            block = np.swapaxes(weighted, 1, 2) @ self.B[coupled]
-            flat[coupled[:, None], j * depth + n + i - j] += block.reshape(len(coupled), -1)
         factor, info = dpbtrf(band.reshape(frames * n, depth).T, lower=1, overwrite_ab=1)
         if info != 0:
             raise OmniEnvsError(f"Clip program: not positive definite at unknown {info}.")

@@ -17,6 +17,7 @@ TIP, HEART = 0, 1
 
 _FLAT = 5e-3  # m: where the heart of an anchored sole moves less, the foot does not roll
 _LANDING = 5e-4  # m: how far from its window a foot may land
+_RISE = 0.03  # m/s that any planted tip may rise or sink
 _SLID = 3.0  # tolerances: an anchored tip that left its window this far was forced to
 
 
@@ -39,15 +40,14 @@ class StanceWindows:
         axes: (T, 2, 2, 2) unit vectors along and across each foot, in which windows are measured.
         centre: (T, 2, 2, 2) of the window: foot; tip or heart; along and across, m.
         slack: (T, 2, 2, 2) half width of the window, infinite for none, m.
-        slow: (T, 2) the tip moves at most ``step`` since the previous frame.
-        step: Largest horizontal step of a slow tip, m, per axis.
+        steps: (T, 2, 3) largest step of the tip since the previous frame, m, along x, y and z;
+            infinite for none.
     """
 
     axes: np.ndarray
     centre: np.ndarray
     slack: np.ndarray
-    slow: np.ndarray
-    step: float
+    steps: np.ndarray
 
 
 def stance_windows(
@@ -56,10 +56,12 @@ def stance_windows(
     """Windows that hold anchored feet in the places they have in a motion.
 
     The tip of an anchored foot stays in one place and its heart within the range it had: where the
-    motion rolled the foot over its toes it may roll, where it did not it may not.
+    motion rolled the foot over its toes it may roll, where it did not it may not. Planted tips that
+    are not anchored are slow, and all planted tips rise no faster than they did: lifting a foot off
+    a slope is slip.
 
     Args:
-        feet: (T, 2, 2, 2) horizontal places of tip and heart of both feet, m.
+        feet: (T, 2, 2, 3) places of tip and heart of both feet, m.
         tiers: (T, 2) tiers of ``stance_tiers``.
         fps: Frames per second.
         options: Settings.
@@ -71,20 +73,23 @@ def stance_windows(
         edges = np.flatnonzero(np.diff(tiers[:, foot] == ANCHORED, prepend=False, append=False))
         for start, end in edges.reshape(-1, 2):
             run = slice(int(start), int(end))
-            arm = (feet[run, foot, TIP] - feet[run, foot, HEART]).mean(axis=0)
+            arm = (feet[run, foot, TIP] - feet[run, foot, HEART]).mean(axis=0)[:2]
             x, y = arm / max(float(np.hypot(*arm)), 1e-9)
             turned = np.array([[x, y], [-y, x]]) if np.hypot(x, y) > 0.5 else np.eye(2)
-            places = feet[run, foot] @ turned.T
+            places = feet[run, foot, :, :2] @ turned.T
             axes[run, foot] = turned
             centre[run, foot, TIP], slack[run, foot, TIP] = _tip_window(places[:, TIP], options)
             centre[run, foot, HEART], slack[run, foot, HEART] = _heart_window(
                 places[:, HEART], options
             )
-    planted = tiers >= LOOSE
-    slow = np.zeros(tiers.shape, bool)
-    slow[1:] = planted[1:] & planted[:-1] & ~((tiers[1:] == ANCHORED) & (tiers[:-1] == ANCHORED))
-    step = options.loose_speed / fps / np.sqrt(2.0)  # half side of the square inside the circle
-    return StanceWindows(axes, centre, slack, slow, float(step))
+    planted, anchored = tiers >= LOOSE, tiers == ANCHORED
+    planted, anchored = (flags[1:] & flags[:-1] for flags in (planted, anchored))
+    slow = options.loose_speed / fps / np.sqrt(2.0)  # half side of the square inside the circle
+    rise = np.maximum(np.abs(np.diff(feet[:, :, TIP, 2], axis=0)), _RISE / fps)
+    steps = np.full((frames, 2, 3), np.inf)
+    steps[1:, :, :2] = np.where(planted & ~anchored, slow, np.inf)[..., None]
+    steps[1:, :, 2] = np.where(planted, rise, np.inf)
+    return StanceWindows(axes, centre, slack, steps)
 
 
 def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
@@ -101,8 +106,8 @@ def _heart_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarra
     low, high = moved.min(axis=0), moved.max(axis=0)
     corner = float(np.linalg.norm(np.maximum(-low, high)))
     if 0.0 < corner < _FLAT:
-        # Nowhere in the window is further from the start than the heart was.
-        part = np.linalg.norm(moved, axis=1).max() / corner
+        # Nowhere in the window is further from the start than the heart was, tolerances included.
+        part = max(np.linalg.norm(moved, axis=1).max() - 2.0 * options.tolerance, 0.0) / corner
         low, high = part * low, part * high
     half = np.repeat(np.maximum(0.5 * (high - low), options.tolerance)[None], len(places), axis=0)
     centre = np.repeat((places[0] + 0.5 * (low + high))[None], len(places), axis=0)
@@ -124,7 +129,7 @@ class KeptStance(RowLimit):
     def __init__(self, windows: StanceWindows, configuration: Kinematics) -> None:
         self._windows = windows
         self._points = Points(configuration.model, *foot_points(configuration.robot))
-        self._t, self._tips = 0, np.zeros((2, 2))
+        self._t, self._tips = 0, np.zeros((2, 3))
         self._landing, self._shift = np.zeros(2, bool), np.zeros((2, 2))
 
     def hold(self, t: int) -> None:
@@ -136,8 +141,8 @@ class KeptStance(RowLimit):
 
     def record(self, configuration: Kinematics) -> None:
         """Remembers where the frame has put the feet."""
-        places = configuration.positions(self._points).reshape(2, 2, 3)[..., :2]
-        offset, slack = self._offsets(places)[:, TIP], self._windows.slack[self._t, :, TIP]
+        places = configuration.positions(self._points).reshape(2, 2, 3)
+        offset, slack = self._offsets(places[..., :2])[:, TIP], self._windows.slack[self._t, :, TIP]
         beside = offset - np.clip(offset, -slack, slack)
         self._shift[self._landing] = np.clip(beside, -_LANDING, _LANDING)[self._landing]
         self._tips = places[:, TIP]
@@ -145,25 +150,20 @@ class KeptStance(RowLimit):
     def rows(self, configuration: Kinematics) -> Rows | None:
         """Returns rows for the windows and for the steps of slow tips."""
         t, windows = self._t, self._windows
-        slow = windows.slow[t] if t > 0 else np.zeros(2, bool)
+        slow = np.isfinite(windows.steps[t])
         slack = windows.slack[t] + np.where(self._landing, _LANDING, 0.0)[:, None, None]
         held = np.isfinite(slack)
         if not (held.any() or slow.any()):
             return None
         places = configuration.positions(self._points)
-        jacobian = configuration.jacobians(self._points, places)[:2]
-        places = places[:, :2].reshape(2, 2, 2)
-        jacobian = jacobian.transpose(1, 0, 2).reshape(2, 2, 2, -1)
-        offset = self._offsets(places)[held]
-        moved = (places[slow, TIP] - self._tips[slow]).ravel()
-        A = np.concatenate(
-            [
-                (windows.axes[t][:, None] @ jacobian)[held],
-                jacobian[slow, TIP].reshape(-1, jacobian.shape[-1]),
-            ]
-        )
-        lower = np.concatenate([-slack[held] - offset, -windows.step - moved])
-        upper = np.concatenate([slack[held] - offset, windows.step - moved])
+        jacobian = configuration.jacobians(self._points, places).transpose(1, 0, 2)
+        places, jacobian = places.reshape(2, 2, 3), jacobian.reshape(2, 2, 3, -1)
+        offset = self._offsets(places[..., :2])[held]
+        moved, step = (places[:, TIP] - self._tips)[slow], windows.steps[t][slow]
+        turned = windows.axes[t][:, None] @ jacobian[:, :, :2]
+        A = np.concatenate([turned[held], jacobian[:, TIP][slow]])
+        lower = np.concatenate([-slack[held] - offset, -step - moved])
+        upper = np.concatenate([slack[held] - offset, step - moved])
         return Rows(A, lower, upper, np.full(len(lower), STANCE))
 
     def _offsets(self, places: np.ndarray) -> np.ndarray:

@@ -45,8 +45,8 @@ class RefineOptions:
     """
 
     acceleration_weight: float = 5e-6
-    radii: tuple[float, ...] = (0.2, 0.07, 0.02, 0.005)
-    tolerance: float = 1e-6
+    radii: tuple[float, ...] = (0.2, 0.05, 0.01)
+    tolerance: float = 1e-5
 
     def __post_init__(self) -> None:
         for name in ("acceleration_weight", "tolerance"):
