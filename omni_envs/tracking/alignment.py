@@ -45,11 +45,12 @@ class Alignment(NamedTuple):
     def positions(self, position: Array) -> Array:
         """Returns the re-aligned positions of (N, B, 3) reference positions."""
         xp = array_namespace(position)
-        cosine, sine = self._rotation()
-        arm = position - self.pivot[:, None, :]
-        x, y = arm[..., 0], arm[..., 1]
-        turned = xp.stack([cosine * x - sine * y, sine * x + cosine * y, arm[..., 2]], -1)
-        return turned + self.origin[:, None, :]
+        c, s = self.half_cosine, self.half_sine
+        cosine, sine, zero = c * c - s * s, 2.0 * c * s, xp.zeros_like(c)
+        rows = [cosine, sine, zero, -sine, cosine, zero, zero, zero, zero + 1.0]
+        transposed = xp.reshape(xp.stack(rows, -1), (*c.shape, 3, 3))
+        offset = self.origin[:, None, :] - self.pivot[:, None, :] @ transposed
+        return position @ transposed + offset
 
     def quaternions(self, q: Array) -> Array:
         """Returns the re-aligned orientations of (N, B, 4) reference orientations."""
@@ -57,22 +58,6 @@ class Alignment(NamedTuple):
         zero = xp.zeros_like(self.half_cosine)
         delta = xp.stack([self.half_cosine, zero, zero, self.half_sine], -1)
         return quaternion.multiply(delta[:, None, :], q)
-
-    def squared_distance(self, position: Array, reference: Array) -> Array:
-        """Returns (N,) means over the bodies of the squared distances ‖p - p'‖².
-
-        Args:
-            position: (N, B, 3) of the robot.
-            reference: (N, B, 3) of the reference, not re-aligned.
-        """
-        cosine, sine = self._rotation()
-        p = position - self.origin[:, None, :]
-        r = reference - self.pivot[:, None, :]
-        rx, ry = r[..., 0], r[..., 1]
-        dx = p[..., 0] - cosine * rx + sine * ry
-        dy = p[..., 1] - sine * rx - cosine * ry
-        dz = p[..., 2] - r[..., 2]
-        return (dot(dx, dx) + dot(dy, dy) + dot(dz, dz)) / position.shape[1]
 
     def angle(self, q: Array, reference: Array) -> Array:
         """Returns (N, B) angles between orientations q and q' of (N, B, 4) arrays, rad.
@@ -83,10 +68,6 @@ class Alignment(NamedTuple):
         return quaternion.angle_of_dot(
             c * dot(q, reference) + s * quaternion.dot_turned(q, reference)
         )
-
-    def _rotation(self) -> tuple[Array, Array]:
-        c, s = self.half_cosine, self.half_sine
-        return (c * c - s * s)[:, None], (2.0 * c * s)[:, None]
 
 
 def align(

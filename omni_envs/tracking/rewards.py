@@ -86,7 +86,9 @@ def tracking_errors(
     return TrackingErrors(
         anchor_position=squared_distance(robot.position[:, anchor], reference.position[:, anchor]),
         anchor_orientation=anchor_angle * anchor_angle,
-        body_position=alignment.squared_distance(robot.position, reference.position),
+        body_position=mean_squared_distance(
+            robot.position, alignment.positions(reference.position)
+        ),
         body_orientation=dot(angles, angles) / angles.shape[1],
         body_linear_velocity=mean_squared_distance(
             robot.linear_velocity, reference.linear_velocity
