@@ -14,6 +14,7 @@ from omni_envs.retargeting.solver import StepSolver
 from omni_envs.retargeting.tasks import CostTask
 
 _KINDS = (STANCE, SELF, CONTACT)
+_DEEP = 5e-3  # m
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,12 @@ class FrameSolver:
         self.options = options
 
     def solve(
-        self, q: np.ndarray, iterations: int, radius: float, convergence: float
+        self,
+        q: np.ndarray,
+        iterations: int,
+        radius: float,
+        convergence: float,
+        fallback: np.ndarray | None = None,
     ) -> FrameResult:
         """Minimises the tasks from a starting configuration, then restores feasibility.
 
@@ -71,6 +77,8 @@ class FrameSolver:
             iterations: Most steps.
             radius: Trust region of a step.
             convergence: Stop when the predicted cost changes relatively less.
+            fallback: (nq,) where to start instead, if the start is deep inside something: from there
+                the way out may be on the wrong side.
         """
         configuration, soft, steps = self.configuration, False, 0
         configuration.update(q)
@@ -79,6 +87,11 @@ class FrameSolver:
             H, g, before = step_model(configuration, self.tasks)
             lower, upper = step_bounds(configuration, self.bounds)
             rows = step_rows(configuration, self.row_limits)
+            if fallback is not None and max(_violations(rows)[1:]) > _DEEP:
+                configuration.update(fallback)
+                fallback = None
+                continue
+            fallback = None
             qp = StepQP(H, g, lower, upper, rows, configuration.metric, radius)
             dq, soft = self.solver(qp)
             configuration.update(configuration.step(dq))
@@ -86,11 +99,11 @@ class FrameSolver:
             last, predicted = predicted, before + qp.decrease(dq)
             if not soft and abs(predicted - last) <= convergence * abs(predicted):
                 break
-        repairs, violations, repair_soft = self._restore()
+        repairs, violations, repair_soft = self._restore(radius)
         q = configuration.data.qpos.copy()
         return FrameResult(q, steps + repairs, violations, soft or repair_soft)
 
-    def _restore(self) -> tuple[int, tuple[float, float, float], bool]:
+    def _restore(self, radius: float) -> tuple[int, tuple[float, float, float], bool]:
         """Shortest steps onto the true constraints, which linearisation may have left violated."""
         configuration, soft = self.configuration, False
         metric = configuration.metric
@@ -105,7 +118,7 @@ class FrameSolver:
             lower, upper = step_bounds(configuration, self.bounds)
             zero = np.zeros(len(metric))
             dq, soft = self.solver(
-                StepQP(np.diag(metric), zero, lower, upper, rows, metric, np.inf)
+                StepQP(np.diag(metric), zero, lower, upper, rows, metric, radius)
             )
             configuration.update(configuration.step(dq))
         return repairs, violations, soft

@@ -8,6 +8,8 @@ from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import BoundLimit
 from omni_envs.robots import Robot
 
+_BASE_SPEED, _BASE_TURN = 10.0, 25.0  # m/s and rad/s: only a broken source asks for more
+
 
 class JointLimit(BoundLimit):
     """q_min ≤ q ≤ q_max, at full gain (mink's own limit closes the gap by 95 % per step)."""
@@ -30,9 +32,9 @@ class StepVelocityLimit(BoundLimit):
     """
 
     def __init__(self, robot: Robot, fps: float, fraction: float) -> None:
-        # A hair inside, so that a velocity computed from rounded positions still satisfies the
-        # limit.
+        # A hair inside, so that a velocity computed from rounded positions satisfies the limit.
         self._step = robot.velocity_limits * (fraction / fps) * (1.0 - 1e-6)
+        self._base = np.repeat([_BASE_SPEED, _BASE_TURN], 3) / fps
         self._previous: np.ndarray | None = None
 
     def set_previous(self, q: np.ndarray | None) -> None:
@@ -41,9 +43,9 @@ class StepVelocityLimit(BoundLimit):
 
     def bounds(self, configuration: Kinematics) -> tuple[np.ndarray, np.ndarray]:
         """Returns what is left of the step since the previous frame."""
-        joints = configuration.data.qpos[7:]
-        lower, upper = np.full(6 + len(joints), -np.inf), np.full(6 + len(joints), np.inf)
-        if self._previous is not None:
-            back = self._previous[7:] - joints
-            lower[6:], upper[6:] = back - self._step, back + self._step
-        return lower, upper
+        nv = configuration.model.nv
+        if self._previous is None:
+            return np.full(nv, -np.inf), np.full(nv, np.inf)
+        back = configuration.difference(self._previous)
+        step = np.concatenate([self._base, self._step])
+        return back - step, back + step

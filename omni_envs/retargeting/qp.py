@@ -11,6 +11,8 @@ from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import BoundLimit, RowLimit, Rows
 from omni_envs.retargeting.tasks import CostTask
 
+_RIDGE = 1e-6  # keeps the program strictly convex where no task moves a joint
+
 
 @dataclass(frozen=True, eq=False)
 class StepQP:
@@ -82,7 +84,7 @@ def step_model(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """H, g and value of the sum of all tasks."""
     nv = configuration.model.nv
-    H, g, value = np.zeros((nv, nv)), np.zeros(nv), 0.0
+    H, g, value = _RIDGE * np.eye(nv), np.zeros(nv), 0.0
     for task in tasks:
         model = task.quadratic(configuration)
         if model is None:

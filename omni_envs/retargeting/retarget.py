@@ -48,6 +48,7 @@ from omni_envs.robots import KEYPOINTS, SIDES, Robot
 # Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
 # step.
 _RELAXED = 2e-4
+_AHEAD = 0.9
 _STRIDE = 5  # frames between those that the plan of footholds is made from
 _FIRST = 1e-6  # convergence on the first frame: whatever is left there drifts into the motion
 
@@ -201,10 +202,11 @@ class _Retargeter:
             self.touch.set_frame(t)
             stance.hold(t)
             result = self.solver.solve(
-                previous,
+                previous if t < 2 else self._ahead(qpos[t - 2], previous),
                 options.iterations if t else options.first_iterations,
                 options.trust_region,
                 options.convergence if t else _FIRST,
+                fallback=previous,
             )
             stance.record(self.configuration, t)
             previous = result.q
@@ -231,6 +233,13 @@ class _Retargeter:
             record,
         )
 
+    def _ahead(self, before: np.ndarray, previous: np.ndarray) -> np.ndarray:
+        """Where most of the last step leads when taken again: a better start than staying."""
+        self.configuration.update(previous)
+        q = self.configuration.step(-_AHEAD * self.configuration.difference(before))
+        q[7:] = np.clip(q[7:], *self.robot.reference_joint_ranges.T)
+        return q
+
     def _place(self, t: int) -> None:
         """Sets the scene and the mesh to frame t."""
         self.mesh.set_frame(t)
@@ -247,7 +256,10 @@ class _Retargeter:
         options = self.options
         for pose in aligned_poses(self.configuration, self.source.keypoints[0]):
             result = self.solver.solve(
-                pose, options.first_iterations, 2 * options.trust_region, options.convergence
+                pose,
+                options.first_iterations // 2,
+                2 * options.trust_region,
+                10 * options.convergence,
             )
             energy = self.mesh.energy(self.configuration) + 1e3 * max(result.violations)
             if energy < lowest:
@@ -275,7 +287,9 @@ class _Retargeter:
                 self.smoothness.set_target(q)
                 options = self.options
                 radius = _STRIDE * options.trust_region
-                q = self.solver.solve(q, options.iterations, radius, options.convergence).q
+                q = self.solver.solve(
+                    q, options.iterations // 2, radius, 10 * options.convergence
+                ).q
             feet[i] = self.configuration.feet()[:, :, :2]
         wishes = foot_wishes(feet)
         # Between these frames the feet follow the human's toes: the offset changes slowly.

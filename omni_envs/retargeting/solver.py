@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
@@ -13,7 +14,7 @@ from omni_envs.retargeting.qp import StepQP
 from omni_envs.retargeting.softness import softness
 
 _SOFT = 8
-_RADIUS_TOLERANCE = 1e-3
+_RADIUS_TOLERANCE = 5e-3
 
 
 class StepSolver(Protocol):
@@ -29,39 +30,44 @@ def solve_daqp(qp: StepQP) -> tuple[np.ndarray, bool]:
     The second-order cone ‖dq‖_S ≤ ε is active exactly when the program with H + λS has its solution
     on the cone, so λ is searched only when the free step is too long.
     """
-    soft = False
     dq = _solve(qp, 0.0)
-    if dq is None:
-        soft = True
-        dq = _solve_soft(qp, 0.0)
-    if qp.norm(dq) <= qp.radius * (1 + _RADIUS_TOLERANCE):
-        return dq, soft
+    if dq is not None:
+        dq = _within(qp, dq, _solve)
+        if dq is not None:
+            return dq, False
+    dq = _solve_soft(qp, 0.0)
+    inside = _within(qp, dq, _solve_soft)
+    return (dq * (qp.radius / qp.norm(dq)) if inside is None else inside), True
 
+
+def _within(
+    qp: StepQP, dq: np.ndarray, solve: Callable[[StepQP, float], np.ndarray | None]
+) -> np.ndarray | None:
+    """The solution on the cone, given the one without; None where rows and cone contradict."""
+    norm = qp.norm(dq)
+    if norm <= qp.radius * (1 + _RADIUS_TOLERANCE):
+        return dq
     # ‖dq(λ)‖ falls with λ, and 1/‖dq(λ)‖ is nearly linear: a bracketed secant takes few steps.
+    scale = float(np.trace(qp.H) / qp.metric.sum())
     low, high = 0.0, np.inf
-    inverse = 1.0 / qp.norm(dq)
-    damping = float(np.trace(qp.H) / qp.metric.sum()) * (qp.norm(dq) / qp.radius - 1.0) * 0.1
-    previous = (0.0, inverse)
-    for _ in range(30):
-        trial = None if soft else _solve(qp, damping)
+    before, damping = (0.0, 1.0 / norm), 0.1 * scale * (norm / qp.radius - 1.0)
+    while damping < 1e7 * scale:
+        trial = solve(qp, damping)
         if trial is None:
-            # The cone and the rows contradict each other.
-            soft = True
-            trial = _solve_soft(qp, damping)
-        dq, norm = trial, qp.norm(trial)
-        if abs(norm / qp.radius - 1.0) <= _RADIUS_TOLERANCE or high - low < 1e-9 * (1 + low):
-            break
+            return None
+        norm = max(qp.norm(trial), 1e-12)
+        if abs(norm / qp.radius - 1.0) <= _RADIUS_TOLERANCE or high - low < 1e-6 * high:
+            return trial
         if norm > qp.radius:
             low = damping
         else:
             high = damping
-        slope = (1.0 / norm - previous[1]) / (damping - previous[0] or np.inf)
-        previous = (damping, 1.0 / norm)
-        guess = damping + (1.0 / qp.radius - 1.0 / norm) / slope if slope > 0 else np.nan
-        if not low < guess < high:
-            guess = 0.5 * (low + high) if np.isfinite(high) else 10.0 * damping
-        damping = guess
-    return dq, soft
+        slope = (1.0 / norm - before[1]) / (damping - before[0])
+        before = (damping, 1.0 / norm)
+        damping += (1.0 / qp.radius - 1.0 / norm) / slope if slope > 0 else np.inf
+        if not low < damping < min(high, 100.0 * max(low, scale)):
+            damping = 0.5 * (low + high) if np.isfinite(high) else 10.0 * max(low, 0.1 * scale)
+    return None
 
 
 def _program(qp: StepQP, damping: float) -> tuple[np.ndarray, ...]:

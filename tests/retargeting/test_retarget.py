@@ -151,7 +151,8 @@ def test_four_times_playback(box_carry):
 
 @pytest.mark.parametrize("shift", [(0.3, 0.0, 0.0), (0.0, -0.25, 0.0)])
 def test_shifted_object(grasp, shift):
-    poses = grasp.object_poses + [*shift, 0, 0, 0, 0]
+    poses = grasp.object_poses.copy()
+    poses[:, :3] += shift
     moved = replace(grasp, object_poses=poses)
     motion = stressed(retarget(moved, G1))
     assert report(moved, motion)["penetration_max_m"] <= 2e-3

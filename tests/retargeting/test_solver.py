@@ -52,7 +52,7 @@ def test_daqp_and_the_cone_agree(grasp, solved, t, radius):
     ours, soft = solve_daqp(qp)
     cone, cone_soft = solve_clarabel(qp)
     assert soft == cone_soft
-    assert qp.norm(ours) <= 1.002 * radius
+    assert qp.norm(ours) <= 1.006 * radius
     if soft:  # the moving box asks for more than the radius allows
         return
     np.testing.assert_allclose(ours, cone, atol=5e-4)
