@@ -9,10 +9,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import torch
-from torch import Tensor
+from omni_envs.errors import FileFormatError, MissingDependencyError
 
-from omni_envs.errors import FileFormatError
+try:
+    import torch
+    from torch import Tensor
+except ImportError as error:
+    raise MissingDependencyError("torch", "sb3", "Reading a training run") from error
 
 FOLDER = "checkpoints"
 _NAME = re.compile(r"step_(\d+)\.pt")

@@ -18,13 +18,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-import torch
-from stable_baselines3 import PPO
-from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.vec_env import VecEnv
-from torch import Tensor, nn
+from omni_envs.errors import MissingDependencyError, OmniEnvsError
 
-from omni_envs.errors import OmniEnvsError
+try:
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.logger import Logger
+    from stable_baselines3.common.vec_env import VecEnv
+    from torch import Tensor, nn
+except ImportError as error:
+    raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
+
 from omni_envs.training.config import PPOConfig
 from omni_envs.training.policy import TrackingPolicy
 

@@ -9,13 +9,18 @@ from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
-import torch
 from gymnasium.vector import VectorEnv
-from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
-from stable_baselines3.common.vec_env import VecMonitor
 
-from omni_envs.errors import InvalidOptionError
+from omni_envs.errors import InvalidOptionError, MissingDependencyError
+
+try:
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+    from stable_baselines3.common.vec_env import VecMonitor
+except ImportError as error:
+    raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
+
 from omni_envs.training.checkpoint import Checkpoint, checkpoints, keep_newest
 from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.curve import write_history

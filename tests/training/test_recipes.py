@@ -36,12 +36,12 @@ def test_everything_can_be_overridden(tmp_path):
         tmp_path,
         5,
         num_envs=7,
-        env_options={"action": {"scale": 2.0}},
+        env_options={"action": {"scale": 1.5}},
         ppo={"epochs": 1},
         seed=3,
     )
     assert config.num_envs == 7 and config.seed == 3 and config.ppo.epochs == 1
-    assert config.env_options == {"action": {"mode": "residual", "scale": 2.0}}
+    assert config.env_options == {"action": {"mode": "residual", "scale": 1.5}}
     assert config.ppo.hidden == RECIPES["small"].ppo.hidden
     with pytest.raises(InvalidOptionError, match="unknown"):
         RECIPES["small"].config("X", tmp_path, 5, sed=3)

@@ -1,0 +1,42 @@
+import csv
+
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from matplotlib.image import imread
+
+from omni_envs.errors import InvalidDataError
+from omni_envs.training.curve import plot_curve, write_history
+
+HISTORY = [
+    {
+        "steps": 1e5 * k,
+        "seconds": 10.0 * k,
+        "episode_length": 20.0 + 5 * k,
+        "episode_return": 1.0 * k,
+        "body_error_m": 0.1 - 0.01 * k,
+        **({"kl": 0.01} if k > 1 else {}),
+    }
+    for k in range(1, 6)
+]
+
+
+def test_numbers_are_kept_and_rows_may_differ(tmp_path):
+    path = write_history(tmp_path, HISTORY)
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(r["steps"]) for r in rows] == [row["steps"] for row in HISTORY]
+    assert rows[0]["kl"] == "" and rows[1]["kl"] == "0.01"
+    assert [p.name for p in tmp_path.iterdir()] == ["curve.csv"]
+
+
+def test_picture_shows_something(tmp_path):
+    picture = imread(plot_curve(tmp_path, HISTORY, 0.02))
+    assert picture.shape[0] > 200 and picture.shape[1] > 800
+    assert picture[..., :3].std() > 0.02
+
+
+def test_nothing_to_draw_is_one_clear_error(tmp_path):
+    with pytest.raises(InvalidDataError, match="at least one update"):
+        plot_curve(tmp_path, [], 0.02)
