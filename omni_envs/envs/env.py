@@ -10,8 +10,9 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from omni_envs.envs.batches import Observation
 from omni_envs.envs.options import UnexpectedOptionError
-from omni_envs.envs.vector_env import RENDER_MODES, Observation, OmniVectorEnv
+from omni_envs.envs.vector_env import RENDER_MODES, OmniVectorEnv
 from omni_envs.errors import InvalidDataError
 
 _OWN = ("num_envs", "num_threads", "autoreset_mode")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
+import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from omni_envs.errors import InvalidOptionError, UnknownNameError
@@ -57,3 +58,10 @@ def autoreset_mode_of(mode: AutoresetMode | str) -> AutoresetMode:
     if name not in supported:
         raise UnknownNameError("autoreset mode", name, supported)
     return supported[name]
+
+
+def merged_seed(seeds: int | Sequence[int | None]) -> int:
+    """Returns a seed, or one seed that depends on all of a list."""
+    if isinstance(seeds, Sequence):
+        return int(np.random.SeedSequence([s or 0 for s in seeds]).generate_state(1)[0])
+    return int(seeds)

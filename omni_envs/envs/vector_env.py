@@ -11,11 +11,19 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from omni_envs.envs.batches import (
+    Observation,
+    add_finals,
+    batched_infos,
+    copied,
+    observation_space,
+    put_rows,
+)
 from omni_envs.envs.divergence import Divergence, DivergenceLog
 from omni_envs.envs.episodes import Episodes, ObjectGate
-from omni_envs.envs.infos import add_finals, batched_infos
 from omni_envs.envs.model import build_model
-from omni_envs.envs.options import autoreset_mode_of, refuse_unknown
+from omni_envs.envs.options import autoreset_mode_of, merged_seed, refuse_unknown
+from omni_envs.envs.pictures import Pictures
 from omni_envs.envs.references import ReferenceLike, common_scene, resolve_references
 from omni_envs.envs.simulation import Simulation
 from omni_envs.envs.task import TrackingTask
@@ -39,10 +47,10 @@ from omni_envs.tracking.randomization import push, start_state
 RESET_OPTIONS = ("reset_mask", "motion", "frame")
 """Options of ``reset``."""
 
-Observation = np.ndarray | dict[str, np.ndarray]
 Options = Mapping[str, Any]
 
 RENDER_MODES = ("rgb_array",)
+"""Values of ``render_mode`` beside None."""
 
 
 class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
@@ -117,8 +125,13 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         **unknown: Any,
     ) -> None:
         refuse_unknown(type(self), unknown)
-        if num_envs < 1:
-            raise InvalidOptionError(f"num_envs must be at least 1; got {num_envs}.")
+        for name, value, least in (
+            ("num_envs", num_envs, 1),
+            ("num_threads", num_threads, 0),
+            ("max_episode_steps", 1 if max_episode_steps is None else max_episode_steps, 1),
+        ):
+            if value < least:
+                raise InvalidOptionError(f"{name} must be at least {least}; got {value}.")
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.config = config = make_config(
             preset,
@@ -142,11 +155,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             raise InvalidOptionError(
                 f"render_mode must be None or 'rgb_array'; got {render_mode!r}."
             )
-        self.render_mode, self._size = render_mode, (width, height)
-        self._renderer: Any = None
+        self.render_mode = render_mode
         self.references = resolve_references(reference, self.robot, task)
         self._library = MotionLibrary(self.robot, self.references, 1 / dt)
         self.scene = common_scene(self.references)
+        self._pictures = Pictures(self.robot, self.scene, width, height)
         self._task = TrackingTask(self.robot, config, self._library.has_object)
         env_model = build_model(self.robot, self.scene, config)
         self._variants = ModelVariants(
@@ -167,22 +180,12 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._observations: Observation | None = None
         self.policy_layout = self._task.policy_layout
         self.critic_layout = self._task.critic_layout
-        self._make_spaces()
-
-    def _make_spaces(self) -> None:
-        def box(size: int) -> spaces.Box:
-            return spaces.Box(-np.inf, np.inf, (size,), np.float32)
-
-        limit = self.config.action.limit
-        self.single_observation_space: spaces.Space = box(self.policy_layout.size)
-        if self.config.observation.privileged:
-            critic = box(self.critic_layout.size)
-            self.single_observation_space = spaces.Dict(
-                {"policy": self.single_observation_space, "critic": critic}
-            )
-        self.single_action_space = spaces.Box(-limit, limit, (self.robot.num_joints,), np.float32)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        critic = self.critic_layout.size if config.observation.privileged else None
+        self.single_observation_space = observation_space(self.policy_layout.size, critic)
+        limit, joints = config.action.limit, self.robot.num_joints
+        self.single_action_space = spaces.Box(-limit, limit, (joints,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
 
     @property
     def control_step(self) -> float:
@@ -209,7 +212,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             Observations of all simulations, and infos.
         """
         if seed is not None:
-            value = seed if isinstance(seed, int | np.integer) else _merged(seed)
+            value = seed if isinstance(seed, int | np.integer) else merged_seed(seed)
             self._np_random, self._np_random_seed = seeding.np_random(int(value))
             self.sampler.reset()
             self._gate.reset()
@@ -229,10 +232,10 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             ids = np.flatnonzero(mask)
         self._start(ids, **options)
         if self._observations is not None and len(ids) < self.num_envs:
-            _put(self._observations, ids, self._observe(ids))
+            put_rows(self._observations, ids, self._observe(ids))
         else:
             self._observations = self._observe()
-        return _copy(self._observations), self._place()
+        return copied(self._observations), self._place()
 
     def step(
         self, actions: np.ndarray
@@ -291,10 +294,10 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         if len(finished) and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos = add_finals(infos, observations, done)
             self._start(finished)
-            _put(observations, finished, self._observe(finished))
+            put_rows(observations, finished, self._observe(finished))
             infos |= self._place()
         self._observations = observations
-        return _copy(observations), reward, terminated, truncated, infos
+        return copied(observations), reward, terminated, truncated, infos
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Returns one (height, width, 3) uint8 picture per simulation, the reference as a ghost."""
@@ -306,25 +309,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Returns a (height, width, 3) uint8 picture of one simulation and its reference."""
         if self._frames is None:
             raise InvalidOptionError("render: call reset first.")
-        if self._renderer is None:
-            from omni_envs.scenes.rendering import SceneRenderer
-
-            width, height = self._size
-            self._renderer = SceneRenderer(self.robot, self.scene, width=width, height=height)
-        nq, frames = self.robot.nq, self._frames
-        qpos = self.simulation.qpos[index]
-        return self._renderer.render(
-            qpos[:nq],
-            qpos[nq : nq + 7] if self._library.has_object else None,
-            ghost_qpos=frames.qpos[index],
-            ghost_object_pose=None if frames.object_pose is None else frames.object_pose[index],
-        )
+        return self._pictures.render(self.simulation.qpos[index], self._frames, index)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the graphics context."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        self._pictures.close()
 
     def _checked(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         actions = np.asarray(actions, float)
@@ -350,7 +339,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         rng, count = self.np_random, len(ids)
         motions, places = self.sampler.draw(count, rng)
         if frame is not None or motion is not None:
-            motions, places = self._place_of(motion, frame, count)
+            motions, places = self._library.places(motion, frame, count)
         start = self._library.frames(self._library.starts[motions] + places)
         qpos, qvel = self._task.full_state(start)
         qpos, qvel = start_state(
@@ -364,20 +353,6 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.simulation.reset(ids, qpos, qvel, rng.integers(self._variants.count, size=count))
         self._episodes.start(ids, motions, places, rng)
         self._frames = self._library.frames(self._episodes.table_index)
-
-    def _place_of(
-        self, motion: int | np.ndarray | None, frame: int | np.ndarray | None, count: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        motions = np.broadcast_to(np.asarray(0 if motion is None else motion), count)
-        places = np.broadcast_to(np.asarray(0 if frame is None else frame), count)
-        lengths = self._library.lengths
-        inside = np.isin(motions, np.arange(len(lengths))).all()
-        if not inside or not ((places >= 0) & (places <= lengths[motions] - 2)).all():
-            raise InvalidOptionError(
-                f"reset: motion must be below {len(lengths)} and frame from 0 to the last but one "
-                f"of the motion; the motions have {lengths.tolist()} frames."
-            )
-        return motions, places
 
     def _push(self, done: np.ndarray) -> None:
         due = self._episodes.due_pushes(self.np_random)
@@ -418,22 +393,3 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self.divergences.append(
                 Divergence(int(i), motion, frame, **self.simulation.before(int(i)))
             )
-
-
-def _copy(observations: Observation) -> Observation:
-    if isinstance(observations, dict):
-        return {key: values.copy() for key, values in observations.items()}
-    return observations.copy()
-
-
-def _put(observations: Observation, ids: np.ndarray, rows: Observation) -> None:
-    if isinstance(observations, dict) and isinstance(rows, dict):
-        for key, values in observations.items():
-            values[ids] = rows[key]
-    elif isinstance(observations, np.ndarray):
-        observations[ids] = rows
-
-
-def _merged(seeds: Sequence[int | None]) -> int:
-    """One seed that depends on all of a list."""
-    return int(np.random.SeedSequence([s or 0 for s in seeds]).generate_state(1)[0])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omni_envs.errors import InvalidDataError
+from omni_envs.errors import InvalidDataError, InvalidOptionError
 from omni_envs.references import Reference
 from omni_envs.robots import Robot
 from omni_envs.tracking.alignment import Bodies
@@ -86,6 +86,29 @@ class MotionLibrary:
     def frames(self, index: np.ndarray) -> Frames:
         """Returns the table's frames at (N,) indices, as fresh arrays."""
         return self._split(np.take(self._table, index, axis=0))
+
+    def places(
+        self, motion: int | np.ndarray | None, frame: int | np.ndarray | None, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Returns (count,) motions and start frames within them, as asked for.
+
+        Args:
+            motion: One for all or (count,); the first by default.
+            frame: One for all or (count,); the first by default.
+            count: How many.
+
+        Raises:
+            InvalidOptionError: There is no such motion, or no frame left to track after the start.
+        """
+        motions = np.broadcast_to(np.asarray(0 if motion is None else motion), count)
+        places = np.broadcast_to(np.asarray(0 if frame is None else frame), count)
+        inside = np.isin(motions, np.arange(self.num_motions)).all()
+        if not inside or not ((places >= 0) & (places <= self.lengths[motions] - 2)).all():
+            raise InvalidOptionError(
+                f"reset: motion must be below {self.num_motions} and frame from 0 to the last but "
+                f"one of the motion; the motions have {self.lengths.tolist()} frames."
+            )
+        return motions, places
 
     def _rows(self, robot: Robot, r: Reference) -> np.ndarray:
         tracked = r.body_indices(robot.tracked_bodies)

@@ -358,6 +358,10 @@ def test_bad_options(reference):
         make(render_mode="human")
     with pytest.raises(InvalidOptionError, match="num_envs"):
         OmniVectorEnv(0, reference=reference)
+    with pytest.raises(InvalidOptionError, match="num_threads must be at least 0; got -1"):
+        make(num_threads=-1)
+    with pytest.raises(InvalidOptionError, match="max_episode_steps"):
+        make(max_episode_steps=0)
     with pytest.raises(InvalidDataError, match="fps"):
         make(physics={"substeps": 5})
     with pytest.raises(InvalidOptionError, match="reference: expected a path"):

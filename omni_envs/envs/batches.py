@@ -1,4 +1,4 @@
-"""Infos of vector environments: one array per key, and a mask ``_key`` of who has it."""
+"""Observations and infos of N simulations, in the form of Gymnasium's vector environments."""
 
 from __future__ import annotations
 
@@ -6,10 +6,41 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
+
+Observation = np.ndarray | dict[str, np.ndarray]
+"""(N, size), or ``{"policy": (N, size), "critic": (N, size)}``."""
+
+
+def observation_space(policy: int, critic: int | None) -> spaces.Space:
+    """Returns the space of one observation: a box, or a dictionary of two with a critic."""
+
+    def box(size: int) -> spaces.Box:
+        return spaces.Box(-np.inf, np.inf, (size,), np.float32)
+
+    if critic is None:
+        return box(policy)
+    return spaces.Dict({"policy": box(policy), "critic": box(critic)})
+
+
+def copied(observations: Observation) -> Observation:
+    """Returns a copy."""
+    if isinstance(observations, dict):
+        return {key: values.copy() for key, values in observations.items()}
+    return observations.copy()
+
+
+def put_rows(observations: Observation, ids: np.ndarray, rows: Observation) -> None:
+    """Overwrites the rows ``ids`` (K,) with the K rows given."""
+    if isinstance(observations, dict) and isinstance(rows, dict):
+        for key, values in observations.items():
+            values[ids] = rows[key]
+    elif isinstance(observations, np.ndarray):
+        observations[ids] = rows
 
 
 def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Returns infos that every simulation has."""
+    """Returns infos that every simulation has: each key with a mask ``_key`` of who has it."""
     infos: dict[str, Any] = dict(values)
     everyone = np.ones(len(next(iter(values.values()))), bool)
     infos.update((f"_{key}", everyone) for key in values)
@@ -17,7 +48,7 @@ def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
 
 
 def add_finals(
-    infos: dict[str, Any], observations: np.ndarray | dict[str, np.ndarray], done: np.ndarray
+    infos: dict[str, Any], observations: Observation, done: np.ndarray
 ) -> dict[str, Any]:
     """Adds ``final_obs`` and ``final_info`` of finished simulations, as SyncVectorEnv does.
 
