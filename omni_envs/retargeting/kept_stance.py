@@ -93,11 +93,14 @@ def stance_windows(
 
 
 def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
-    """Centre and half widths about (F, 2) places of a tip, half the tolerance left for later."""
+    """(F, 2) centres and half widths about the places of a tip."""
     low, high = places.min(axis=0), places.max(axis=0)
-    half = 0.5 * (high - low)
-    slid = half > _SLID * options.tolerance
-    return 0.5 * (low + high), np.where(slid, half, 0.5 * options.tolerance)
+    if (high - low).max() > 2.0 * _SLID * options.tolerance:
+        # It was forced to move: it moves where it moved, and holds still where it did.
+        return places, np.full(places.shape, options.tolerance)
+    centre = np.broadcast_to(0.5 * (low + high), places.shape)
+    # Half the tolerance is left to the restoration.
+    return centre, np.full(places.shape, 0.5 * options.tolerance)
 
 
 def _heart_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:

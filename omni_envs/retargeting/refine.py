@@ -31,6 +31,7 @@ from omni_envs.robots import KEYPOINTS, Robot, get_robot
 # influence of a frame has faded there.
 _WINDOW, _CONTEXT = 320, 24
 _RELAXED = 2e-4
+_REPAIR = 0.1  # m and rad: longest step of a coordinate that repairs a frame
 
 
 @dataclass(frozen=True)
@@ -182,8 +183,10 @@ class _Restoration:
             if last or max(left) <= self._options.restoration_tolerance:
                 break
             lower, upper = step_bounds(configuration, self._bounds)
-            radius = self._options.trust_region
-            dq, _ = solve_daqp(StepQP(np.diag(metric), zero, lower, upper, rows, metric, radius))
+            # Where rows contradict each other the shortest step may be absurdly long.
+            np.clip(lower, -_REPAIR, 0.0, out=lower)
+            np.clip(upper, 0.0, _REPAIR, out=upper)
+            dq, _ = solve_daqp(StepQP(np.diag(metric), zero, lower, upper, rows, metric, np.inf))
             configuration.update(configuration.step(dq))
         self._previous = configuration.data.qpos.copy()
         program.stance.record(configuration)
