@@ -30,11 +30,8 @@ class ContactLimit(RowLimit):
             return None
         contact = data.contact
         bodies = model.geom_bodyid[contact.geom]
-        mask = configuration.ancestors[bodies]
-        A = configuration.wrench_rows(contact.pos, contact.frame[:, :3])
-        A *= mask[:, 1] - mask[:, 0]
-        # A body of the surroundings has no degree of freedom in its row; every robot body has the
-        # root's.
-        own = mask[:, :, 0].all(axis=1)
+        A = configuration.contact_rows(bodies, contact.pos, contact.frame[:, :3])
+        # Every degree of freedom of the root moves every body of the robot, and nothing else.
+        own = configuration.ancestors[bodies][:, :, 0].all(axis=1)
         lower = -contact.dist - np.where(own, 0.0, self._tolerance)
         return Rows(A, lower, np.full(len(lower), np.inf), np.where(own, SELF, CONTACT))

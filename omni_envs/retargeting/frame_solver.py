@@ -77,8 +77,8 @@ class FrameSolver:
             iterations: Most steps.
             radius: Trust region of a step.
             convergence: Stop when the predicted cost changes relatively less.
-            fallback: (nq,) where to start instead, if the start is deep inside something: from there
-                the way out may be on the wrong side.
+            fallback: (nq,) where to start instead, if the start is deep inside something: from
+                there the way out may be on the wrong side.
         """
         configuration, soft, steps = self.configuration, False, 0
         configuration.update(q)

@@ -161,6 +161,21 @@ class Kinematics(mink.Configuration):
             self._memory["feet_jacobians"] = jacobian
         return self._memory["feet_jacobians"]
 
+    def contact_rows(
+        self, bodies: np.ndarray, points: np.ndarray, normals: np.ndarray
+    ) -> np.ndarray:
+        """(N, nv) rows n·(J₂ - J₁) of contacts at (N, 3) points between (N, 2) bodies.
+
+        Args:
+            bodies: First and second body of each contact.
+            points: Where they touch.
+            normals: From the first to the second body.
+        """
+        mask = self.ancestors[bodies]
+        rows = self.wrench_rows(points, normals)
+        rows *= mask[:, 1] - mask[:, 0]
+        return rows
+
     def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""
         arm = points - self.data.subtree_com[self._root]

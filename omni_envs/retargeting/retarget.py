@@ -149,7 +149,13 @@ class _Retargeter:
         self, source: SourceMotion, robot: Robot, options: RetargetOptions, mesh: InteractionMesh
     ) -> None:
         self.source, self.robot, self.options = source, robot, options
-        self.configuration = Kinematics(
+        kinematics: type[Kinematics] = Kinematics
+        step_solver = solve_daqp if options.solver == "daqp" else solve_clarabel
+        if options.backend == "placo":
+            from omni_envs.retargeting.placo_backend import PlacoKinematics, solve_placo
+
+            kinematics, step_solver = PlacoKinematics, solve_placo
+        self.configuration = kinematics(
             robot,
             source.scene,
             options.contact_distance,
@@ -176,7 +182,7 @@ class _Retargeter:
             + ([self.touch] if options.contact_weight > 0 and source.contact_points else []),
             bounds,
             self.limits,
-            solve_daqp if options.solver == "daqp" else solve_clarabel,
+            step_solver,
             options,
         )
 

@@ -25,18 +25,32 @@ class StepSolver(Protocol):
 
 
 def solve_daqp(qp: StepQP) -> tuple[np.ndarray, bool]:
-    """Solves a step with DAQP. Never fails: bounds hold, contradicting rows give way in order.
+    """Solves a step with DAQP. Never fails: bounds hold, contradicting rows give way in order."""
+    return solve_on_cone(qp, _solve, _solve_soft)
+
+
+def solve_on_cone(
+    qp: StepQP,
+    hard: Callable[[StepQP, float], np.ndarray | None],
+    soft: Callable[[StepQP, float], np.ndarray],
+) -> tuple[np.ndarray, bool]:
+    """Solves a step with a solver of quadratic programs.
 
     The second-order cone ‖dq‖_S ≤ ε is active exactly when the program with H + λS has its solution
     on the cone, so λ is searched only when the free step is too long.
+
+    Args:
+        qp: The step.
+        hard: Solves it with a given λ and without the cone; None where rows contradict each other.
+        soft: The same with soft rows.
     """
-    dq = _solve(qp, 0.0)
+    dq = hard(qp, 0.0)
     if dq is not None:
-        dq = _within(qp, dq, _solve)
+        dq = _within(qp, dq, hard)
         if dq is not None:
             return dq, False
-    dq = _solve_soft(qp, 0.0)
-    inside = _within(qp, dq, _solve_soft)
+    dq = soft(qp, 0.0)
+    inside = _within(qp, dq, soft)
     return (dq * (qp.radius / qp.norm(dq)) if inside is None else inside), True
 
 
