@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -41,6 +41,11 @@ def _origin(position: np.ndarray, rotation: Rotation) -> str:
     return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(rotation.as_euler("xyz"))}"/>'
 
 
+def _link(body: str) -> str:
+    """Name of a body's link: joints and links share one namespace there."""
+    return f"{body}_body"
+
+
 def urdf(robot: Robot) -> str:
     """Writes the robot as a URDF from the uncompiled specification, without MuJoCo's arithmetic."""
     lines = [f'<robot name="{robot.name}">']
@@ -53,7 +58,7 @@ def urdf(robot: Robot) -> str:
         )
         centre = _origin(body.ipos, Rotation.identity())
         lines.append(
-            f"<link name={quoteattr(body.name)}><inertial>{centre}"
+            f"<link name={quoteattr(_link(body.name))}><inertial>{centre}"
             f'<mass value="{body.mass:.17g}"/><inertia {entries}/></inertial></link>'
         )
         if body.name == robot.root_body:
@@ -63,7 +68,8 @@ def urdf(robot: Robot) -> str:
         lines.append(
             f'<joint name={quoteattr(joint.name)} type="revolute">'
             f"{_origin(body.pos, _rotation(body.quat))}"
-            f"<parent link={quoteattr(body.parent.name)}/><child link={quoteattr(body.name)}/>"
+            f"<parent link={quoteattr(_link(body.parent.name))}/>"
+            f"<child link={quoteattr(_link(body.name))}/>"
             f'<axis xyz="{_numbers(joint.axis)}"/>'
             f'<limit lower="{joint.range[0]:.17g}" upper="{joint.range[1]:.17g}"'
             ' effort="1" velocity="1"/></joint>'
@@ -99,7 +105,7 @@ def check_against_pinocchio(tmp_path: Path) -> Callable[[Robot], None]:
                 other.set_joint(joint, float(value))
             other.update_kinematics()
             for name in robot.body_names:
-                pose, body = np.array(other.get_T_world_frame(name)), data.body(name)
+                pose, body = np.array(other.get_T_world_frame(_link(name))), data.body(name)
                 np.testing.assert_allclose(body.xpos, pose[:3, 3], atol=1e-6, err_msg=name)
                 np.testing.assert_allclose(
                     body.xmat.reshape(3, 3), pose[:3, :3], atol=1e-6, err_msg=name
@@ -183,5 +189,195 @@ def check_stands() -> Callable[[Robot], None]:
                 model.body(b).name for b in model.geom_bodyid[data.contact.geom].ravel() if b
             }
             assert touching == {f.body for f in robot.feet.values()}
+
+    return check
+
+
+BUILDS = {"kinematics": None, "physics": PhysicsOptions()}
+
+
+def contacts(model: mujoco.MjModel, qpos: np.ndarray) -> dict[tuple[str, str], float]:
+    """Penetrating pairs of the robot's bodies and their depth (m)."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    found: dict[tuple[str, str], float] = {}
+    for geoms, distance in zip(data.contact.geom, data.contact.dist, strict=True):
+        bodies = np.sort(model.geom_bodyid[geoms])
+        if distance < 0 and bodies[0] > 0:
+            pair = model.body(bodies[0]).name, model.body(bodies[1]).name
+            found[pair] = max(found.get(pair, 0.0), -float(distance))
+    return found
+
+
+@pytest.fixture
+def touching() -> Callable[[Robot, str, dict[str, float]], dict[tuple[str, str], float]]:
+    """Pairs of bodies in contact, default pose but for the given joints, build, in the air."""
+
+    def find(robot: Robot, build: str, joints: dict[str, float]) -> dict[tuple[str, str], float]:
+        model = build_spec(robot, Scene(), BUILDS[build], looks=False).compile()
+        qpos = robot.default_qpos.copy()
+        qpos[2] += 1.0
+        for joint, value in joints.items():
+            low, high = robot.joint_ranges[robot.joint_names.index(joint)]
+            assert low <= value <= high
+            qpos[7 + robot.joint_names.index(joint)] = value
+        return contacts(model, qpos)
+
+    return find
+
+
+def extent(model: mujoco.MjModel, geoms: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) lowest and highest coordinates of geoms in the frame of their body, m."""
+    boxes = []
+    for geom in geoms:
+        kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+        turn = np.abs(_rotation(model.geom_quat[geom]).as_matrix())
+        if kind == int(mujoco.mjtGeom.mjGEOM_BOX):
+            half = turn @ size
+        else:
+            length = size[1] if kind == int(mujoco.mjtGeom.mjGEOM_CAPSULE) else 0.0
+            half = turn[:, 2] * length + size[0]
+        boxes.append((model.geom_pos[geom] - half, model.geom_pos[geom] + half))
+    low, high = zip(*boxes, strict=True)
+    return np.min(low, axis=0), np.max(high, axis=0)
+
+
+def geoms_of(model: mujoco.MjModel, body: str, groups: tuple[int, ...]) -> list[int]:
+    """Geoms of a body in groups."""
+    owner = model.body(body).id
+    return [
+        g
+        for g in range(model.ngeom)
+        if model.geom_bodyid[g] == owner and model.geom_group[g] in groups
+    ]
+
+
+@pytest.fixture
+def hull_extent() -> Callable[[Robot, str], tuple[np.ndarray, np.ndarray]]:
+    """(3,) lowest and highest coordinates of what collides on a body, in its frame."""
+
+    def measure(robot: Robot, body: str) -> tuple[np.ndarray, np.ndarray]:
+        return extent(robot.model, geoms_of(robot.model, body, (3, 4)))
+
+    return measure
+
+
+@pytest.fixture
+def check_geoms() -> Callable[[Robot, set[str]], None]:
+    """Primitives only, looks that never collide, friction on the given bodies, few geoms."""
+
+    def check(robot: Robot, bodies: set[str]) -> None:
+        model = robot.model
+        looks = model.geom_group == 2
+        assert model.nmesh == 0 and looks.sum() > 60
+        assert not np.any(model.geom_contype[looks]) and not np.any(model.geom_conaffinity[looks])
+        assert np.all(np.isin(model.geom_group[~looks], (3, 4, 5)))
+        for physics in BUILDS.values():
+            built = build_spec(robot, Scene(), physics, looks=False).compile()
+            assert built.ngeom < 45  # every geom is paid for in every step
+            assert np.all(built.geom_condim[1:] >= 3) and np.all(built.geom_friction[1:, 0] >= 0.5)
+            assert {built.body(b).name for b in built.geom_bodyid} >= bodies
+
+    return check
+
+
+@pytest.fixture
+def check_soles() -> Callable[[Robot], None]:
+    """Flat soles on the ground in the default pose; nothing of the foot below them."""
+
+    def check(robot: Robot) -> None:
+        model, data = robot.model, mujoco.MjData(robot.model)
+        data.qpos[:] = robot.default_qpos
+        mujoco.mj_kinematics(model, data)
+        for foot in robot.feet.values():
+            sole, body = np.array(foot.sole), data.body(foot.body)
+            plane = sole[0, 2]
+            assert np.all(sole[:, 2] == plane) and sole[-1, 0] == sole[:, 0].max()
+            height = (body.xpos + sole @ body.xmat.reshape(3, 3).T)[:, 2]
+            np.testing.assert_allclose(height, 0.0, atol=1e-4)
+            for group in (4, 5):  # flat soles for kinematics, sole points for physics
+                geoms = geoms_of(model, foot.body, (group,))
+                for g in geoms:
+                    assert extent(model, [g])[0][2] == pytest.approx(plane, abs=1e-9)
+                low, high = extent(model, geoms)
+                assert np.all(sole[:, :2] >= low[:2] - 0.001), "the sole carries every point"
+                assert np.all(sole[:, :2] <= high[:2] + 0.001), "the sole carries every point"
+            assert len(geoms_of(model, foot.body, (5,))) == 4
+            for g in geoms_of(model, foot.body, (3,)):
+                assert extent(model, [g])[0][2] > plane + 0.001
+
+    return check
+
+
+@pytest.fixture
+def check_mirror() -> Callable[[Robot, Callable[[str], str], Callable[[str], bool]], None]:
+    """Mirrored joint states put mirrored keypoints.
+
+    Takes the robot, what names the joint of the other side, and which joints change sign.
+    """
+
+    def check(robot: Robot, other: Callable[[str], str], flips: Callable[[str], bool]) -> None:
+        flip = np.array([-1.0 if flips(j) else 1.0 for j in robot.joint_names])
+        swap = [robot.joint_names.index(other(j)) for j in robot.joint_names]
+        mirrored = np.sort(flip[:, None] * robot.joint_ranges[swap], axis=1)
+        np.testing.assert_array_equal(robot.joint_ranges, mirrored)
+        np.testing.assert_array_equal(
+            robot.default_joint_array, flip * robot.default_joint_array[swap]
+        )
+        data, random = mujoco.MjData(robot.model), np.random.default_rng(1)
+        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        for _ in range(20):
+            joints = random.uniform(*robot.joint_ranges.T)
+            points = []
+            for state in (joints, flip * joints[swap]):
+                data.qpos[7:] = state
+                mujoco.mj_kinematics(robot.model, data)
+                points.append(keypoints_of(robot, data))
+            for name, point in points[0].items():
+                same = name.replace("left", "?").replace("right", "left").replace("?", "right")
+                np.testing.assert_allclose(point * (1, -1, 1), points[1][same], atol=1e-6)
+
+    return check
+
+
+def keypoints_of(robot: Robot, data: mujoco.MjData) -> dict[str, np.ndarray]:
+    """World keypoints of a pose whose kinematics are up to date."""
+    return {
+        k: data.body(p.body).xpos + data.body(p.body).xmat.reshape(3, 3) @ p.offset
+        for k, p in robot.keypoints.items()
+    }
+
+
+@pytest.fixture
+def standing() -> Callable[[Robot], dict[str, np.ndarray]]:
+    """World keypoints of the default pose."""
+
+    def measure(robot: Robot) -> dict[str, np.ndarray]:
+        data = mujoco.MjData(robot.model)
+        data.qpos[:] = robot.default_qpos
+        mujoco.mj_kinematics(robot.model, data)
+        return keypoints_of(robot, data)
+
+    return measure
+
+
+@pytest.fixture
+def check_actuators() -> Callable[[Robot, dict[str, tuple]], None]:
+    """Compiled gains, limits and armature against (range, kp, kd, effort, speed, scale)."""
+
+    def check(robot: Robot, joints: dict[str, tuple]) -> None:
+        model = robot.model
+        assert list(robot.joint_names) == list(joints)
+        for i, (name, expected) in enumerate(joints.items()):
+            limits, kp, kd, effort, speed, scale = expected
+            np.testing.assert_allclose(model.joint(name).range, limits, atol=1e-12)
+            assert model.actuator_trnid[i, 0] == model.joint(name).id
+            assert model.actuator_gainprm[i, 0] == kp
+            assert tuple(model.actuator_biasprm[i, :3]) == (0, -kp, -kd)
+            assert tuple(model.actuator_forcerange[i]) == (-effort, effort)
+            assert model.actuator_forcelimited[i]
+            assert robot.velocity_limits[i] == speed
+            assert robot.action_scale[i] == pytest.approx(scale, abs=5e-4)
 
     return check
