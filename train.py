@@ -13,7 +13,6 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-import omni_envs  # noqa: F401  (registers the environments)
 from omni_envs.errors import InvalidOptionError, MissingDependencyError, OmniEnvsError
 from omni_envs.progress import progress_bar
 from omni_envs.training.config import TrainConfig

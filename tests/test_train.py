@@ -104,6 +104,7 @@ def test_resumes_and_shows_a_table(run, reference, capsys):
         (("--ppo", '{"gama": 1}'), "unknown ['gama']"),
         (("--env-options", '{"rewards": {}}'), "rewards"),
         (("--resume",), "config.json"),
+        (("--env", "OmniEnvs/G1BoxCary-v0"), "G1BoxCarry"),
         (("--steps", "0"), "steps must be positive"),
     ],
 )

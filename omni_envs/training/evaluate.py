@@ -8,12 +8,12 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.vector import VectorEnv
 
 from omni_envs.progress import ProgressCallback
 from omni_envs.training.config import TrainConfig, merged
+from omni_envs.training.environment import make_env
 from omni_envs.training.rollout import Episodes, Policy, play
 from omni_envs.training.statistics import wilson_interval
 
@@ -103,13 +103,7 @@ def evaluation_options(
 
 def make_evaluation_env(config: TrainConfig, num_envs: int, **kind: bool) -> VectorEnv:
     """Makes the environment that policies of a run are evaluated in; see ``evaluation_options``."""
-    return gym.make_vec(
-        config.env,
-        num_envs=num_envs,
-        vectorization_mode="vector_entry_point",
-        num_threads=config.num_threads,
-        **evaluation_options(config.env_options, **kind),
-    )
+    return make_env(config, num_envs, evaluation_options(config.env_options, **kind))
 
 
 def play_windows(

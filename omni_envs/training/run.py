@@ -7,7 +7,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import gymnasium as gym
 import numpy as np
 from gymnasium.vector import VectorEnv
 
@@ -25,6 +24,7 @@ from omni_envs.training.checkpoint import Checkpoint, checkpoints, keep_newest
 from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.curve import write_history
 from omni_envs.training.display import TrainingDisplay
+from omni_envs.training.environment import make_env
 from omni_envs.training.ppo import TrackingPPO
 from omni_envs.training.rollout import BODY_ERROR
 from omni_envs.training.sb3_vec_env import SB3VecEnv
@@ -71,7 +71,8 @@ def train(
         Where it is and how it went.
 
     Raises:
-        InvalidOptionError: The run directory is in use, or there is nothing to resume.
+        InvalidOptionError: The run directory is in use, there is nothing to resume, or there is no
+            such environment.
         FileFormatError: The checkpoint to resume from is damaged.
         OmniEnvsError: Training diverged.
     """
@@ -82,23 +83,13 @@ def train(
         )
     if resume and not found:
         raise InvalidOptionError(f"{config.out} holds no checkpoint to resume from.")
-    made = env or make_training_env(config)
+    options = merged(config.env_options, config.training_options)
+    made = env or make_env(config, config.num_envs, options)
     try:
         return _train(config, made, found[-1] if found else None, progress)
     finally:
         if env is None:
             made.close()
-
-
-def make_training_env(config: TrainConfig) -> VectorEnv:
-    """Makes the environment of a run."""
-    return gym.make_vec(
-        config.env,
-        num_envs=config.num_envs,
-        vectorization_mode="vector_entry_point",
-        num_threads=config.num_threads,
-        **merged(config.env_options, config.training_options),
-    )
 
 
 def _train(
