@@ -13,6 +13,7 @@ from omni_envs.demonstrations import (
     scale_demonstration,
 )
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting.clip_qp import Band, ClipQP
 from omni_envs.robots import G1
 
 
@@ -68,3 +69,70 @@ def largebox(shared) -> SourceMotion:
     folder = shared / "data" / "omomo"
     clip = load_demonstration(folder / "sub3_largebox_003.pt", object_mesh=folder / "largebox.obj")
     return scale_demonstration(clip, G1.height)
+
+
+@pytest.fixture(scope="session")
+def make_clip_qp():
+    """``make_clip_qp(frames, n, rows, pairs, seed)``: a random program of a clip."""
+    return _make_clip_qp
+
+
+@pytest.fixture(scope="session")
+def dense_clip_qp():
+    """``dense_clip_qp(qp)``: Hessian and constraint matrix, written out from the definition."""
+    return _dense_clip_qp
+
+
+def _make_clip_qp(frames=7, n=5, rows=4, pairs=2, seed=0) -> ClipQP:
+    rng = np.random.default_rng(seed)
+    J = rng.normal(size=(frames, 3, n))
+    H = np.swapaxes(J, 1, 2) @ J + 0.1 * np.eye(n)
+    weight = rng.uniform(1.0, 3.0, n)
+    diagonal = np.zeros((frames, n))
+    D, E = np.zeros((max(frames - 1, 0), n)), np.zeros((max(frames - 2, 0), n))
+    for t in range(frames - 2):
+        diagonal[t : t + 3] += weight * np.array([[1.0], [4.0], [1.0]])
+        D[t : t + 2] -= 2.0 * weight
+        E[t] += weight
+    H[:, np.arange(n), np.arange(n)] += diagonal
+    inside = rng.uniform(0.02, 0.1, (frames, n))
+    change = rng.uniform(0.02, 0.1, (max(frames - 1, 0), n))
+    low = rng.normal(size=(frames, rows)) * 0.05 - 0.1
+    half = rng.uniform(0.01, 0.05, (max(frames - 1, 0), pairs))
+    B, C = rng.normal(size=(2, max(frames - 1, 0), pairs, n))
+    return ClipQP(
+        H=H,
+        g=2.0 * rng.normal(size=(frames, n)),
+        D=D,
+        E=E,
+        box=Band(-inside, inside),
+        change=Band(-change, change),
+        rows=Band(low, np.full_like(low, np.inf), np.full_like(low, 1e6)),
+        A=rng.normal(size=(frames, rows, n)),
+        pairs=Band(-half, half, 1e5),
+        B=B,
+        C=C,
+    )
+
+
+def _dense_clip_qp(qp: ClipQP) -> tuple[np.ndarray, np.ndarray]:
+    """Hessian and constraint matrix, written out from the definition."""
+    frames, n = qp.g.shape
+    hessian = np.zeros((frames, n, frames, n))
+    for t in range(frames):
+        hessian[t, :, t] = qp.H[t]
+        if t + 1 < frames:
+            hessian[t + 1, :, t] = hessian[t, :, t + 1] = np.diag(qp.D[t])
+        if t + 2 < frames:
+            hessian[t + 2, :, t] = hessian[t, :, t + 2] = np.diag(qp.E[t])
+    blocks = [np.eye(frames * n).reshape(-1, frames, n)]
+    change = np.zeros((frames - 1, n, frames, n))
+    pairs = np.zeros((*qp.B.shape[:2], frames, n))
+    rows = np.zeros((*qp.A.shape[:2], frames, n))
+    for t in range(frames - 1):
+        change[t, :, t], change[t, :, t + 1] = -np.eye(n), np.eye(n)
+        pairs[t, :, t], pairs[t, :, t + 1] = qp.B[t], qp.C[t]
+    for t in range(frames):
+        rows[t, :, t] = qp.A[t]
+    blocks += [part.reshape(-1, frames, n) for part in (change, rows, pairs)]
+    return hessian.reshape(frames * n, -1), np.concatenate(blocks).reshape(-1, frames * n)
