@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import mink
 import mujoco
@@ -198,6 +198,7 @@ def _foot_points(foot: Foot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return tip, heart, tip + 0.1 * left
 
 
+@lru_cache(maxsize=8)
 def _compile(
     robot: Robot, scene: Scene, contact_distance: float, self_distance: float | None
 ) -> mujoco.MjModel:
