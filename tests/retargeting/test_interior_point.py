@@ -3,8 +3,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 
+from omni_envs.retargeting import retarget
+from omni_envs.retargeting.clip_program import ClipProgram
 from omni_envs.retargeting.clip_qp import ClipQP
 from omni_envs.retargeting.interior_point import solve_clip_qp
+from omni_envs.robots import G1
 
 
 def solve_with_clarabel(qp: ClipQP, hessian: np.ndarray, matrix: np.ndarray) -> np.ndarray:
@@ -65,3 +68,16 @@ def test_without_active_constraints_it_is_a_linear_solve(make_clip_qp, dense_cli
     hessian, _ = dense_clip_qp(qp)
     expected = np.linalg.solve(hessian, -qp.g.ravel())
     np.testing.assert_allclose(solve_clip_qp(qp, 1e-10).x.ravel(), expected, atol=1e-9)
+
+
+def test_agrees_on_real_frames(grasp, cut, dense_clip_qp):
+    motion = retarget(cut(grasp, 14, 28), G1)
+    program = ClipProgram(motion.source, G1, motion.options, 5e-6, motion.qpos)
+    qp = program.linearise(motion.qpos, 0, motion.num_frames, 0.05)
+    ours, theirs = solve_clip_qp(qp, 1e-10), solve_with_clarabel(qp, *dense_clip_qp(qp))
+    assert ours.residual <= 1e-9
+    assert qp.cost(ours.x) == pytest.approx(qp.cost(theirs), rel=1e-5)
+    np.testing.assert_allclose(ours.x, theirs, atol=5e-4)
+    # The tolerance that refinement uses is as good for smoothness.
+    coarse = solve_clip_qp(qp, 1e-5)
+    assert qp.cost(coarse.x) == pytest.approx(qp.cost(ours.x), rel=0.05)
