@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,34 +16,37 @@ if TYPE_CHECKING:
 
 
 class Pictures:
-    """Renders simulations of one scene; graphics are only set up when something is rendered.
+    """Renders simulations; graphics are only set up when something is rendered.
 
     Args:
         robot: The robot.
-        scene: Its scene.
+        scenes: The scenes.
         width: Pixels.
         height: Pixels.
     """
 
-    def __init__(self, robot: Robot, scene: Scene, width: int, height: int) -> None:
-        self._robot, self._scene, self._size = robot, scene, (width, height)
-        self._renderer: SceneRenderer | None = None
+    def __init__(self, robot: Robot, scenes: Sequence[Scene], width: int, height: int) -> None:
+        self._robot, self._scenes, self._size = robot, scenes, (width, height)
+        self._renderers: dict[int, SceneRenderer] = {}
 
-    def render(self, qpos: np.ndarray, frames: Frames, row: int) -> np.ndarray:
+    def render(self, scene: int, qpos: np.ndarray, frames: Frames, row: int) -> np.ndarray:
         """Returns a (height, width, 3) uint8 picture.
 
         Args:
+            scene: Index of the scene that the simulation is in.
             qpos: (nq,) state of the simulation, the object's pose last.
             frames: Reference frames of all simulations.
             row: The one that belongs to this simulation.
         """
-        if self._renderer is None:
+        if scene not in self._renderers:
             from omni_envs.scenes.rendering import SceneRenderer
 
             width, height = self._size
-            self._renderer = SceneRenderer(self._robot, self._scene, width=width, height=height)
+            self._renderers[scene] = SceneRenderer(
+                self._robot, self._scenes[scene], width=width, height=height
+            )
         nq, poses = self._robot.nq, frames.object_pose
-        return self._renderer.render(
+        return self._renderers[scene].render(
             qpos[:nq],
             None if poses is None else qpos[nq : nq + 7],
             ghost_qpos=frames.qpos[row],
@@ -51,6 +55,5 @@ class Pictures:
 
     def close(self) -> None:
         """Frees the graphics context."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
+        while self._renderers:
+            self._renderers.popitem()[1].close()

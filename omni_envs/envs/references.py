@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Union
 
+import numpy as np
+
 from omni_envs.demonstrations.demonstration import Demonstration
-from omni_envs.errors import InvalidDataError, InvalidOptionError
+from omni_envs.errors import InvalidOptionError
 from omni_envs.references import Reference
 from omni_envs.robots import Robot
 from omni_envs.scenes import Scene
@@ -59,16 +62,9 @@ def _resolve(item: ReferenceLike, robot: Robot) -> Reference:
     )
 
 
-def common_scene(references: Sequence[Reference]) -> Scene:
-    """Returns the scene that all references share.
-
-    Raises:
-        InvalidDataError: They stand in different scenes.
-    """
-    scene = references[0].scene
-    for other in references[1:]:
-        if other.scene.to_dict() != scene.to_dict():
-            raise InvalidDataError(
-                "Environment", "reference", "references that share one scene", "different scenes"
-            )
-    return scene
+def distinct_scenes(references: Sequence[Reference]) -> tuple[tuple[Scene, ...], np.ndarray]:
+    """Returns the different scenes of references, and (M,) which one each reference has."""
+    keys = [json.dumps(r.scene.to_dict(), sort_keys=True) for r in references]
+    distinct = list(dict.fromkeys(keys))
+    index = np.array([distinct.index(key) for key in keys])
+    return tuple(references[keys.index(key)].scene for key in distinct), index

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 from mujoco import batch
 
 from omni_envs.envs.model import EnvModel
-from omni_envs.errors import InvalidOptionError
+from omni_envs.errors import InvalidDataError, InvalidOptionError
 from omni_envs.robots import Robot
 from omni_envs.scenes import OBJECT, Box, SceneObject
 from omni_envs.tracking.config import ObjectRandomization, RandomizationConfig
@@ -20,21 +21,22 @@ SEED = 20260101
 
 
 class ModelVariants:
-    """A pool of randomized models of one layout.
+    """A pool of randomized models of one layout, ``count`` for every scene.
 
     Completing a randomized model (``mj_setConst``) costs as much as several control steps, so a
     pool of them is made once. An episode that starts gets a variant: the fields in which variants
-    differ are copied into its simulation, or, where meshes differ, it runs on the variant's model.
+    differ are copied into its simulation, or, where scenes or meshes differ, it runs on the
+    variant's model.
 
     Attributes:
-        count: Number of variants.
+        count: Number of variants of a scene.
         fields: Model field to (count, …) values, for the fields in which the variants differ.
-        models: The variants themselves where their meshes differ, else empty.
+        models: The variants themselves where scenes or meshes differ, scene by scene, else empty.
 
     Args:
-        env_model: The model without randomization.
-        robot: The robot in it.
-        scene_object: The object in it, if any.
+        env_models: The models without randomization, one per scene.
+        robot: The robot in them.
+        objects: The objects in them.
         config: What to randomize.
 
     Raises:
@@ -43,56 +45,82 @@ class ModelVariants:
 
     def __init__(
         self,
-        env_model: EnvModel,
+        env_models: Sequence[EnvModel],
         robot: Robot,
-        scene_object: SceneObject | None,
+        objects: Sequence[SceneObject | None],
         config: RandomizationConfig,
     ) -> None:
         if config.variants < 1:
             raise InvalidOptionError("randomization.variants must be at least 1.")
-        self.count = 1
+        pools = [_draw(m, robot, o, config) for m, o in zip(env_models, objects, strict=True)]
+        self.count = len(pools[0])
         self.fields: dict[str, np.ndarray] = {}
         self.models: tuple[mujoco.MjModel, ...] = ()
-        model = env_model.model
-        objects = config.object if scene_object is not None else None
-        if not (config.torso_centre_of_mass or config.friction or objects):
-            return
-        rng = np.random.default_rng(SEED)
-        meshes = scene_object is not None and not all(
-            isinstance(p.shape, Box) for p in scene_object.parts
-        )
-        data = mujoco.MjData(model)
-        variants = []
-        for _ in range(config.variants):
-            if objects is not None and objects.shape and meshes and scene_object is not None:
-                factor = 1.0 + objects.shape * (2.0 * rng.random() - 1.0)
-                variant = _compile_scaled(env_model.spec, scene_object, factor)
-            else:
-                variant = copy.copy(model)
-            if config.torso_centre_of_mass is not None:
-                torso = variant.body(robot.torso_body).id
-                variant.body_ipos[torso] += symmetric(rng, 1, config.torso_centre_of_mass)[0]
-            if config.friction is not None:
-                geoms = [g for g in range(model.ngeom) if _body(model, g) in robot.body_names]
-                variant.geom_friction[geoms, 0] = rng.uniform(*config.friction)
-            if objects is not None and scene_object is not None:
-                share = 0.0 if meshes else objects.shape
-                scale = _scale_boxes(variant, scene_object, share, rng)
-                _randomize_mass(variant, scale, objects, rng)
-            mujoco.mj_setConst(variant, data)
-            variants.append(variant)
-        self.count = len(variants)
-        if meshes and objects is not None and objects.shape:
-            self.models = tuple(variants)
+        shaped = config.object is not None and config.object.shape > 0
+        if len(pools) > 1 or (shaped and _has_meshes(objects[0])):
+            self.models = tuple(model for pool in pools for model in pool)
         else:
-            self.fields = _differing_fields(model, variants)
+            self.fields = _differing_fields(env_models[0].model, pools[0])
+
+    def choose(self, scene: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Draws (K,) variants for episodes in scenes (K,)."""
+        return scene * self.count + rng.integers(self.count, size=len(scene))
 
     def attach(self, simulations: batch.Batch) -> dict[str, np.ndarray]:
-        """Gives every differing field one value per simulation; returns the live arrays."""
+        """Gives every differing field one value per simulation; returns the live arrays.
+
+        Raises:
+            InvalidDataError: The scenes have models of different layout.
+        """
+        try:
+            if self.models:
+                for start in range(0, len(self.models), self.count):
+                    simulations.set_models(self.models[start])
+        except mujoco.FatalError as error:
+            expected = "references whose scenes have the same kinds and numbers of shapes"
+            raise InvalidDataError("Environment", "reference", expected, str(error)) from error
         live = {name: simulations.expand(name) for name in self.fields}
         # Of the bounding volumes only those of bodies can differ, not those inside meshes.
         self.fields = {name: v[:, : live[name].shape[1]] for name, v in self.fields.items()}
         return live
+
+
+def _draw(
+    env_model: EnvModel, robot: Robot, scene_object: SceneObject | None, config: RandomizationConfig
+) -> list[mujoco.MjModel]:
+    """Returns the variants of one scene; the model itself where nothing is randomized."""
+    model = env_model.model
+    objects = config.object if scene_object is not None else None
+    if not (config.torso_centre_of_mass or config.friction or objects):
+        return [model]
+    rng, data = np.random.default_rng(SEED), mujoco.MjData(model)
+    meshes = _has_meshes(scene_object)
+    variants = []
+    for _ in range(config.variants):
+        if objects is not None and objects.shape and meshes and scene_object is not None:
+            factor = 1.0 + objects.shape * (2.0 * rng.random() - 1.0)
+            variant = _compile_scaled(env_model.spec, scene_object, factor)
+        else:
+            variant = copy.copy(model)
+        if config.torso_centre_of_mass is not None:
+            torso = variant.body(robot.torso_body).id
+            variant.body_ipos[torso] += symmetric(rng, 1, config.torso_centre_of_mass)[0]
+        if config.friction is not None:
+            geoms = [g for g in range(model.ngeom) if _body(model, g) in robot.body_names]
+            variant.geom_friction[geoms, 0] = rng.uniform(*config.friction)
+        if objects is not None and scene_object is not None:
+            share = 0.0 if meshes else objects.shape
+            scale = _scale_boxes(variant, scene_object, share, rng)
+            _randomize_mass(variant, scale, objects, rng)
+        mujoco.mj_setConst(variant, data)
+        variants.append(variant)
+    return variants
+
+
+def _has_meshes(scene_object: SceneObject | None) -> bool:
+    return scene_object is not None and not all(
+        isinstance(p.shape, Box) for p in scene_object.parts
+    )
 
 
 def _compile_scaled(

@@ -24,7 +24,7 @@ from omni_envs.envs.episodes import Episodes, ObjectGate
 from omni_envs.envs.model import build_model
 from omni_envs.envs.options import autoreset_mode_of, merged_seed, refuse_unknown
 from omni_envs.envs.pictures import Pictures
-from omni_envs.envs.references import ReferenceLike, common_scene, resolve_references
+from omni_envs.envs.references import ReferenceLike, distinct_scenes, resolve_references
 from omni_envs.envs.simulation import Simulation
 from omni_envs.envs.task import TrackingTask
 from omni_envs.envs.variants import ModelVariants
@@ -67,6 +67,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         robot: The robot.
         config: Every number of the task.
         references: What is tracked.
+        scenes: The different scenes of the references.
         policy_layout: Names and slices of the policy's observation.
         critic_layout: Names and slices of the privileged observation.
         simulation: The physics.
@@ -158,15 +159,14 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.render_mode = render_mode
         self.references = resolve_references(reference, self.robot, task)
         self._library = MotionLibrary(self.robot, self.references, 1 / dt)
-        self.scene = common_scene(self.references)
-        self._pictures = Pictures(self.robot, self.scene, width, height)
+        self.scenes, self._scene_of = distinct_scenes(self.references)
+        self._pictures = Pictures(self.robot, self.scenes, width, height)
         self._task = TrackingTask(self.robot, config, self._library.has_object)
-        env_model = build_model(self.robot, self.scene, config)
-        self._variants = ModelVariants(
-            env_model, self.robot, self.scene.object, config.randomization
-        )
+        models = [build_model(self.robot, scene, config) for scene in self.scenes]
+        objects = [scene.object for scene in self.scenes]
+        self._variants = ModelVariants(models, self.robot, objects, config.randomization)
         self.simulation = Simulation(
-            env_model, self.robot, self._variants, num_envs, config.physics.substeps, num_threads
+            models[0], self.robot, self._variants, num_envs, config.physics.substeps, num_threads
         )
         if max_episode_steps is None and config.termination.max_seconds is not None:
             max_episode_steps = max(round(config.termination.max_seconds / dt), 1)
@@ -309,7 +309,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Returns a (height, width, 3) uint8 picture of one simulation and its reference."""
         if self._frames is None:
             raise InvalidOptionError("render: call reset first.")
-        return self._pictures.render(self.simulation.qpos[index], self._frames, index)
+        scene = int(self._scene_of[self._episodes.motion[index]])
+        return self._pictures.render(scene, self.simulation.qpos[index], self._frames, index)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the graphics context."""
@@ -350,7 +351,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self._task.soft_upper,
             rng,
         )
-        self.simulation.reset(ids, qpos, qvel, rng.integers(self._variants.count, size=count))
+        variant = self._variants.choose(self._scene_of[motions], rng)
+        self.simulation.reset(ids, qpos, qvel, variant)
         self._episodes.start(ids, motions, places, rng)
         self._frames = self._library.frames(self._episodes.table_index)
 

@@ -10,7 +10,9 @@ from omni_envs.scenes import Box, ConvexMesh, Part, Scene, SceneObject
 FPS = 50.0
 
 
-def _sway(frames: int = 120, with_object: bool = True, mesh: bool = False):
+def _sway(
+    frames: int = 120, with_object: bool = True, mesh: bool = False, half: float | None = None
+):
     """A standing G1 that sways and turns on the spot, a box sliding in front of it."""
     t = np.arange(frames) / FPS
     qpos = np.tile(G1.default_qpos, (frames, 1))
@@ -23,7 +25,7 @@ def _sway(frames: int = 120, with_object: bool = True, mesh: bool = False):
     poses = np.zeros((frames, 7))
     poses[:, :3] = np.stack([1.0 + 0.1 * np.sin(t), 0.1 * t, 0.16 + 0.0 * t], axis=1)
     poses[:, 3:] = rotations.exp(np.stack([0 * t, 0 * t, 0.3 * t], axis=1))
-    shape = Box((0.2, 0.18, 0.15))
+    shape = Box((0.2, 0.18, 0.15) if half is None else (half, half, half))
     if mesh:
         surface = shape.mesh()
         shape = ConvexMesh(np.array(surface.vertices), np.array(surface.faces))

@@ -331,13 +331,35 @@ def test_several_motions(make, sway, reference):
         env.reset(options={"motion": 2})
 
 
-def test_references_of_different_scenes_are_refused(make, sway, reference):
-    other = sway()
-    scene = other.scene.from_dict(other.scene.to_dict())
-    object.__setattr__(scene, "ground_friction", 0.5)
-    object.__setattr__(other, "scene", scene)
-    with pytest.raises(InvalidDataError, match="share one scene"):
-        make(reference=[reference, other])
+def test_every_motion_has_its_own_scene(make, sway, quiet):
+    small, large = sway(half=0.10), sway(half=0.20)
+    env = make(40, **quiet, reference=[small, large, small])
+    assert len(env.scenes) == 2
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(np.zeros((40, 29)))
+    motions = env.reset(seed=1)[1]["motion"]
+    assert set(motions) == {0, 1, 2}
+    for i in range(40):
+        model = env.simulation.model_of(i)
+        size = model.geom_size[model.geom("object_0").id]
+        np.testing.assert_allclose(size, 0.2 if motions[i] == 1 else 0.1)
+
+
+def test_scenes_and_randomization_go_together(make, sway):
+    env = make(200, reference=[sway(half=0.10), sway(half=0.20)])
+    motions = env.reset(seed=1)[1]["motion"]
+    sizes = np.array(
+        [m.geom_size[m.geom("object_0").id] for m in map(env.simulation.model_of, range(200))]
+    )
+    half = np.where(motions == 1, 0.2, 0.1)[:, None]
+    assert (np.abs(sizes / half - 1) <= 0.1 + 1e-9).all()
+    assert len(np.unique(sizes[:, 0])) > 60
+
+
+def test_scenes_of_another_layout_are_refused(make, sway, reference):
+    with pytest.raises(InvalidDataError, match="same kinds and numbers of shapes"):
+        make(reference=[reference, sway(mesh=True)])
 
 
 def test_bad_options(reference):
