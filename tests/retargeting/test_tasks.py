@@ -1,0 +1,111 @@
+"""Every task's model is the true value, gradient and (Gauss-Newton) curvature of its cost."""
+
+import mink
+import numpy as np
+import pytest
+
+from omni_envs.retargeting import InteractionMesh
+from omni_envs.retargeting.contact_task import ContactTask
+from omni_envs.retargeting.foothold_task import FootholdTask
+from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
+from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.proximal_task import ProximalTask
+from omni_envs.retargeting.stance_plan import StancePlan
+from omni_envs.robots import G1
+
+
+@pytest.fixture(scope="module")
+def configuration(grasp):
+    configuration = Kinematics(G1, grasp.scene)
+    configuration.place_object(grasp.object_poses[50])
+    return configuration
+
+
+@pytest.fixture(scope="module")
+def q(grasp):
+    q = G1.default_qpos.copy()
+    q[:3] = grasp.keypoints[50, 0]
+    q[7:] += np.random.default_rng(0).normal(scale=0.1, size=29)
+    return q
+
+
+def foothold_task():
+    frames, feet = 1, 2
+    plan = StancePlan(
+        tier=np.zeros((frames, feet), int),
+        turns=np.zeros((frames, feet), bool),
+        rolls=np.zeros((frames, feet), bool),
+        tips=np.zeros((frames, feet, 2)),
+        tip_slack=np.zeros((frames, feet)),
+        tip_step=np.zeros((frames, feet)),
+        forward=np.array([[[1.0, 0.0], [0.6, 0.8]]]),
+        arms=np.array([[[-0.1, 0.0], [-0.08, 0.02]]]),
+        arm_weights=np.array([[[5.0, 7.0], [0.0, 3.0]]]),
+    )
+    return FootholdTask(plan)
+
+
+def tasks(grasp, configuration):
+    mesh = InteractionMeshTask(InteractionMesh.of(grasp, 40), 10.0)
+    mesh.set_frame(50)
+    near = ProximalTask(np.linspace(0.1, 1.0, 35))
+    near.set_target(G1.default_qpos)
+    touch = ContactTask(grasp, configuration, 60.0)
+    touch.set_frame(50)
+    return {"mesh": mesh, "proximal": near, "contact": touch, "foothold": foothold_task()}
+
+
+@pytest.mark.parametrize("name", ["mesh", "proximal", "contact", "foothold"])
+def test_model(grasp, configuration, q, name):
+    task = tasks(grasp, configuration)[name]
+    configuration.update(q)
+    model = task.quadratic(configuration)
+    assert model is not None and model.value > 0
+    H = np.diag(model.H) if model.H.ndim == 1 else model.H
+    np.testing.assert_allclose(H, H.T, atol=1e-9)
+    assert np.linalg.eigvalsh(H).min() > -1e-8
+    step = 1e-5
+    for i in range(35):
+        dq = np.zeros(35)
+        dq[i] = step
+        values = []
+        for sign in (1, -1):
+            configuration.update(q)
+            configuration.update(configuration.step(sign * dq))
+            values.append(task.quadratic(configuration).value)
+        assert model.g[i] == pytest.approx((values[0] - values[1]) / (2 * step), abs=2e-4)
+    configuration.update(q)
+    objective = task.compute_qp_objective(configuration)
+    assert isinstance(objective, mink.Objective)
+    np.testing.assert_array_equal(objective.H, H)
+
+
+def test_tasks_that_are_off(grasp, configuration, q):
+    configuration.update(q)
+    touch, near = ContactTask(grasp, configuration, 60.0), ProximalTask(np.ones(35))
+    for task in (touch, near):
+        assert task.quadratic(configuration) is None
+        assert not task.compute_qp_objective(configuration).H.any()
+
+
+def test_contact_pull_starts_gently(grasp, configuration):
+    from omni_envs.retargeting.contact_task import _ramps
+
+    ramps = _ramps(np.array([[False] * 3 + [True] * 20 + [False] * 2, [True] * 25]))
+    assert ramps[0, 3] == pytest.approx(0.2) and ramps[0, 22] == pytest.approx(0.2)
+    assert ramps[0, 12] == 1.0 and ramps[0, 2] == 0.0
+    assert (ramps[1] == 1.0).all()
+
+
+def test_contact_gap_is_to_the_surface_of_the_link(grasp, configuration, q):
+    from omni_envs.retargeting.contact_task import _Link
+
+    configuration.update(q)
+    link = _Link(configuration, "left_hand")
+    far = configuration.data.body("left_wrist_yaw_link").xpos.copy()
+    far[2] += 1.0
+    _, point, gap = link.nearest(configuration, far)
+    np.testing.assert_allclose(point + gap, far)
+    assert 0.8 < np.linalg.norm(gap) < 1.0
+    _, _, inside = link.nearest(configuration, configuration.data.geom("left_palm_hull").xpos)
+    assert not inside.any()
