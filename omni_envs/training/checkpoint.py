@@ -35,6 +35,8 @@ class Checkpoint:
         optimizer: State of the optimiser.
         rng: State of torch's random generator.
         history: One row of figures per update.
+        episodes: Return and length of the episodes that finished last, which the means in
+            ``history`` are over.
     """
 
     steps: int
@@ -45,6 +47,7 @@ class Checkpoint:
     optimizer: dict[str, Any]
     rng: Tensor
     history: list[dict[str, float]] = field(default_factory=list)
+    episodes: list[tuple[float, float]] = field(default_factory=list)
 
     def save(self, run: Path) -> Path:
         """Writes the checkpoint into a run directory; it is there whole or not at all."""

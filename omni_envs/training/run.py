@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -182,6 +183,7 @@ def _checkpoint(
         optimizer=learner.policy.optimizer.state_dict(),
         rng=torch.get_rng_state(),
         history=history,
+        episodes=[(float(e["r"]), float(e["l"])) for e in learner.ep_info_buffer or ()],
     )
 
 
@@ -197,6 +199,9 @@ def _restore(learner: TrackingPPO, state: Checkpoint, seed: int) -> None:
     learner.policy.optimizer.load_state_dict(state.optimizer)
     learner.num_timesteps, learner._n_updates = state.steps, state.updates
     learner.current_learning_rate = state.learning_rate
+    window = learner._stats_window_size
+    learner.ep_info_buffer = deque(({"r": r, "l": n} for r, n in state.episodes), maxlen=window)
+    learner.ep_success_buffer = deque(maxlen=window)
     # The simulations start anew: episodes under way at the checkpoint are not part of it.
     learner.env.seed((seed + state.steps) % 2**31)
     torch.set_rng_state(state.rng)

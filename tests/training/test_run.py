@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
@@ -57,6 +58,16 @@ def test_a_resumed_run_goes_on_from_the_last_checkpoint(chase, tmp_path):
     seconds = [row["seconds"] for row in longer.history]
     assert seconds == sorted(seconds)
     assert not _same(first, _policy(tmp_path))
+
+
+def test_figures_go_on_where_they_were(chase, tmp_path):
+    """Right after a restart only short episodes have finished: alone they would mislead."""
+    train(_config(tmp_path, 20 * ROLLOUT), env=chase(16))
+    longer = train(_config(tmp_path, 21 * ROLLOUT), resume=True, env=chase(16))
+    before, after = (row["episode_length"] for row in longer.history[-2:])
+    assert after == pytest.approx(before, rel=0.2)
+    saved = Checkpoint.load(checkpoints(tmp_path)[-1]).episodes
+    assert np.mean([length for _, length in saved]) == pytest.approx(after)
 
 
 def test_resuming_a_finished_run_changes_nothing(chase, tmp_path):
