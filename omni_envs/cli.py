@@ -55,13 +55,13 @@ class List:
 
 @dataclass
 class Retarget:
-    """One demonstration → one reference."""
+    """One demonstration → one reference; several → several, over processes."""
 
-    source: tyro.conf.Positional[str]
-    """A demonstration file, or the name of a built-in demonstration."""
+    source: tyro.conf.Positional[tuple[str, ...]]
+    """Demonstration files, or names of built-in demonstrations."""
 
     out: Path
-    """Where the reference goes (.npz)."""
+    """Where the reference goes (.npz); a folder where there are several sources."""
 
     robot: str = "g1"
     """Name of the robot."""
@@ -81,35 +81,61 @@ class Retarget:
     solver: Literal["daqp", "clarabel"] = "daqp"
     """Solver of the frame-by-frame pass; clarabel takes the trust region as a cone."""
 
+    backend: Literal["mink", "placo"] = "mink"
+    """Kinematics and QP; placo is there to check with."""
+
     refine: bool = True
     """Smooth the whole clip under the same constraints after the frame-by-frame pass."""
 
+    jobs: int | None = None
+    """Processes for several sources; one per core by default."""
+
     json: bool = False
-    """Print JSON."""
+    """Print JSON: one object, or a list if there are several sources."""
 
     def run(self) -> None:  # noqa: D102
         from omni_envs.demonstrations import load_demonstration
+        from omni_envs.errors import InvalidOptionError
         from omni_envs.progress import progress_bar
-        from omni_envs.references import make_reference
+        from omni_envs.references import make_reference, make_references
         from omni_envs.retargeting import RetargetOptions
         from omni_envs.robots import get_robot
 
         robot = get_robot(self.robot)
-        _check_out(self.out, ".npz")
-        demonstration = load_demonstration(
-            self.source, object_mesh=self.object, terrain_mesh=self.terrain, height=self.height
-        )
-        with progress_bar("Retargeting", disable=self.json) as progress:
-            reference = make_reference(
-                demonstration,
-                robot,
-                fps=self.fps,
-                options=RetargetOptions(solver=self.solver, refine=self.refine),
-                progress=progress,
+        options = RetargetOptions(solver=self.solver, backend=self.backend, refine=self.refine)
+        several = len(self.source) > 1
+        if not several:
+            _check_suffix(self.out, ".npz")
+        demonstrations = [
+            load_demonstration(
+                source, object_mesh=self.object, terrain_mesh=self.terrain, height=self.height
             )
-        reference.save(self.out)
-        rows = {**_summary(reference), **_speed(reference)}
-        _show(f"{demonstration.name} → {robot.title}: {self.out}", rows, self.json)
+            for source in self.source
+        ]
+        names = [d.name for d in demonstrations]
+        if len(set(names)) < len(names):
+            raise InvalidOptionError(f"--out: sources of equal name would overwrite: {names}.")
+        with progress_bar("Retargeting", disable=self.json) as progress:
+            common: dict[str, Any] = {"fps": self.fps, "options": options, "progress": progress}
+            if several:
+                made = make_references(demonstrations, robot, jobs=self.jobs, **common)
+            else:
+                made = [make_reference(demonstrations[0], robot, **common)]
+        rows, failed = [], []
+        for demonstration, reference in zip(demonstrations, made, strict=True):
+            if isinstance(reference, OmniEnvsError):
+                failed.append(f"{demonstration.name}: {reference}")
+                continue
+            path = self.out / f"{demonstration.name}.npz" if several else self.out
+            path.parent.mkdir(parents=True, exist_ok=True)
+            reference.save(path)
+            rows.append({**_summary(reference), **_speed(reference)})
+            if not self.json:
+                _show(f"{demonstration.name} → {robot.title}: {path}", rows[-1], False)
+        if self.json:
+            print(json.dumps(rows if several else rows[0], allow_nan=False))
+        if failed:
+            raise OmniEnvsError("; ".join(failed))
 
 
 @dataclass
@@ -347,12 +373,11 @@ def _speed(reference: Any) -> dict[str, float]:
     return {"solve_seconds": seconds, "frames_per_s": frames / seconds}
 
 
-def _check_out(path: Path, suffix: str) -> None:
+def _check_suffix(path: Path, suffix: str) -> None:
     from omni_envs.errors import InvalidOptionError
 
     if path.suffix != suffix:
         raise InvalidOptionError(f"--out {path}: must end in {suffix}; got {path.suffix!r}.")
-    path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -44,6 +44,17 @@ def test_retarget_prints_the_figures_of_the_file(tmp_path, capsys):
     assert rows["frames_per_s"] > 0
 
 
+def test_several_sources_go_into_a_folder(tmp_path, capsys):
+    sources = []
+    for name in ("a", "b"):
+        positions = np.zeros((3, 53, 3), np.float32)
+        positions[:, :, 2] = np.linspace(0.0, 1.7, 53)
+        np.save(tmp_path / f"{name}.npy", positions[:, :, :2])  # not positions: refused
+        sources.append(str(tmp_path / f"{name}.npy"))
+    assert main(["retarget", *sources, "--out", str(tmp_path / "out"), "--json"]) == 1
+    assert "a.npy" in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
 def test_evaluate_reads_what_retarget_wrote(retargeted, capsys):
     assert main(["evaluate", str(retargeted), "--json"]) == 0
     rows = output(capsys)
@@ -86,6 +97,7 @@ def test_view_writes_pictures(retargeted, tmp_path, capsys):
         (["retarget", "no_such_clip", "--out", "r.npz"], "box_carry"),
         (["retarget", "box_carry", "--robot", "r2d2", "--out", "r.npz"], "g1"),
         (["retarget", "box_carry", "--out", "r.csv"], ".npz"),
+        (["retarget", "box_carry", "box_carry", "--out", "folder"], "overwrite"),
         (["retarget", "absent.pt", "--out", "r.npz"], "absent.pt"),
         (["evaluate", "absent.npz"], "absent.npz"),
         (["view", "absent.npz"], "--strip"),

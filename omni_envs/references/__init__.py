@@ -5,6 +5,7 @@ from omni_envs.references.cache import cache_folder, cached_reference
 from omni_envs.references.foreign import open_reference, reference_from_motion
 from omni_envs.references.formats import ForeignMotion, load_motion
 from omni_envs.references.kinematics import reference_from_qpos
+from omni_envs.references.parallel import make_references
 from omni_envs.references.picture import report_picture
 from omni_envs.references.reference import Reference
 
@@ -16,6 +17,7 @@ __all__ = [
     "evaluate_reference",
     "load_motion",
     "make_reference",
+    "make_references",
     "open_reference",
     "reference_from_motion",
     "reference_from_qpos",
