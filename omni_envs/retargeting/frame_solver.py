@@ -69,6 +69,7 @@ class FrameSolver:
         radius: float,
         convergence: float,
         fallback: np.ndarray | None = None,
+        restore: bool = True,
     ) -> FrameResult:
         """Minimises the tasks from a starting configuration, then restores feasibility.
 
@@ -79,6 +80,7 @@ class FrameSolver:
             convergence: Stop when the predicted cost changes relatively less.
             fallback: (nq,) where to start instead, if the start is deep inside something: from
                 there the way out may be on the wrong side.
+            restore: Restore feasibility on true distances; without, violations are not known (0).
         """
         configuration, soft, steps = self.configuration, False, 0
         configuration.update(q)
@@ -96,9 +98,13 @@ class FrameSolver:
             dq, soft = self.solver(qp)
             configuration.update(configuration.step(dq))
             steps += 1
-            last, predicted = predicted, before + qp.decrease(dq)
-            if not soft and abs(predicted - last) <= convergence * abs(predicted):
+            change = qp.decrease(dq)
+            last, predicted = predicted, before + change
+            small = min(abs(change), abs(predicted - last))
+            if not soft and small <= convergence * abs(predicted):
                 break
+        if not restore:
+            return FrameResult(configuration.data.qpos.copy(), steps, (0.0, 0.0, 0.0), soft)
         repairs, violations, repair_soft = self._restore(radius)
         q = configuration.data.qpos.copy()
         return FrameResult(q, steps + repairs, violations, soft or repair_soft)

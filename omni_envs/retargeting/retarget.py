@@ -50,7 +50,7 @@ from omni_envs.robots import KEYPOINTS, SIDES, Robot
 _RELAXED = 2e-4
 _AHEAD = 0.9
 _STRIDE = 5  # frames between those that the plan of footholds is made from
-_FIRST = 1e-6  # convergence on the first frame: whatever is left there drifts into the motion
+_FIRST = 1e-5  # convergence on the first frame: whatever is left there drifts into the motion
 
 
 def retarget(
@@ -294,7 +294,7 @@ class _Retargeter:
                 options = self.options
                 radius = _STRIDE * options.trust_region
                 q = self.solver.solve(
-                    q, options.iterations // 2, radius, 10 * options.convergence
+                    q, options.iterations // 2, radius, 10 * options.convergence, restore=False
                 ).q
             feet[i] = self.configuration.feet()[:, :, :2]
         wishes = foot_wishes(feet)
