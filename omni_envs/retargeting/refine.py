@@ -46,7 +46,7 @@ class RefineOptions:
     """
 
     acceleration_weight: float = 5e-6
-    radii: tuple[float, ...] = (0.2, 0.05, 0.01)
+    radii: tuple[float, ...] = (0.4, 0.1, 0.02)
     tolerance: float = 1e-5
 
     def __post_init__(self) -> None:
@@ -72,7 +72,7 @@ def refine(
     violates a constraint so may the result, and its record says by how much.
 
     Args:
-        retargeted: Result of ``retarget`` or ``resample``.
+        retargeted: Result of ``retarget``.
         options: Settings.
         progress: Called with (frames done, frames in all), counting every round.
 
