@@ -326,7 +326,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         bad = ~np.isfinite(actions).all(axis=1)
         if bad.any():
             actions = np.where(bad[:, None], 0.0, actions)
-        return np.clip(actions, -limit, limit), bad
+        return np.minimum(np.maximum(actions, -limit), limit), bad
 
     def _start(
         self,

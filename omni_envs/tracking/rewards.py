@@ -116,7 +116,8 @@ def joint_limit_excess(joint_position: Array, lower: Array, upper: Array) -> Arr
     """Returns (N,) sums of the excess of (N, n) joint positions over soft limits (n,), rad."""
     xp = array_namespace(joint_position)
     outside = xp.maximum(joint_position - upper, lower - joint_position)
-    return xp.sum(xp.clip(outside, 0.0, None), axis=-1)
+    # Half of x + |x| is the positive part.
+    return 0.5 * xp.sum(outside + xp.abs(outside), axis=-1)
 
 
 def bodies_in_contact(force: Array, threshold: float) -> Array:
