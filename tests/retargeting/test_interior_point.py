@@ -71,7 +71,7 @@ def test_without_active_constraints_it_is_a_linear_solve(make_clip_qp, dense_cli
 
 
 def test_agrees_on_real_frames(grasp, cut, dense_clip_qp):
-    motion = retarget(cut(grasp, 14, 28), G1)
+    motion = retarget(cut(grasp, 16, 24), G1)
     program = ClipProgram(motion.source, G1, motion.options, 5e-6, motion.qpos)
     qp = program.linearise(motion.qpos, 0, motion.num_frames, 0.05)
     ours, theirs = solve_clip_qp(qp, 1e-10), solve_with_clarabel(qp, *dense_clip_qp(qp))
