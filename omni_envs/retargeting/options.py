@@ -35,7 +35,7 @@ class StanceOptions:
     tolerance: float = 1e-4
     heart_tolerance: float = 1.2e-3
     loose: StanceMode | None = "code"
-    loose_speed: float = 0.08
+    loose_speed: float = 0.07
 
     def __post_init__(self) -> None:
         for name in ("anchored", "loose"):
