@@ -203,7 +203,8 @@ SKELETON = Skeleton(
         f"{side}_{link}": tuple(f"{side[0].upper()}_{joint}" for joint in joints)
         for side in SIDES
         for link, joints in (
-            ("hand", ("Palm", "Fingers")),
+            # Palm and fingers lie flat: equally near, the touched point would jump between them.
+            ("hand", ("Palm",)),
             ("foot", ("Toes", "Heel")),
             ("knee", ("Knee",)),
         )
