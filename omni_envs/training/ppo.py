@@ -130,11 +130,13 @@ class TrackingPPO(PPO):
         Raises:
             OmniEnvsError: The loss is not finite any more.
         """
-        rollout = self._rollout()
         network = self.policy.mlp_extractor
-        if int(network.actor_normalizer.count) > 0:
-            self._update(rollout)
-        network.update_normalizers(rollout.observations)
+        # Actor and critic learn at the same time: half of the cores for each.
+        with _threads(max(1, (os.cpu_count() or 1) // 2)):
+            rollout = self._rollout()
+            if int(network.actor_normalizer.count) > 0:
+                self._update(rollout)
+            network.update_normalizers(rollout.observations)
 
     def _rollout(self) -> Rollout:
         buffer = self.rollout_buffer
@@ -164,8 +166,7 @@ class TrackingPPO(PPO):
         totals: Counter[str] = Counter()
         # Actor and critic share no weights: each learns in its own thread, so that two cores are
         # busy without waiting for each other inside every small matrix product.
-        threads = max(1, (os.cpu_count() or 1) // 2)
-        with ThreadPoolExecutor(1) as second, _threads(threads):
+        with ThreadPoolExecutor(1) as second:
             for _ in range(config.epochs):
                 for batch in rollout.minibatches(config.minibatches):
                     policy.optimizer.zero_grad()
