@@ -14,6 +14,7 @@ from omni_envs.scenes.build import LOOKS, OBJECT, PHYSICS_ONLY, build_spec
 from omni_envs.scenes.scene import Scene
 
 _GHOST_RGBA = (0.25, 0.62, 0.95, 0.35)
+_STANDING_ROOT_HEIGHT = 0.8
 _SKY_RGB = (0.93, 0.95, 0.97)
 
 
@@ -25,7 +26,8 @@ class Camera:
         azimuth: Degrees about z; 90 looks along +y.
         elevation: Degrees; negative looks down.
         distance: m from the point.
-        look_at: The point, m; None follows the robot's root, at ``height``.
+        look_at: The point, m; None follows the robot's root, at ``height`` while it stands, squats or
+            crawls on the ground, higher as it climbs.
         height: Height of the followed point, m.
     """
 
@@ -105,9 +107,8 @@ class SceneRenderer:
         view = mujoco.MjvCamera()
         view.azimuth, view.elevation = camera.azimuth, camera.elevation
         view.distance = camera.distance
-        view.lookat = (
-            (qpos[0], qpos[1], camera.height) if camera.look_at is None else camera.look_at
-        )
+        climbed = max(0.0, qpos[2] - _STANDING_ROOT_HEIGHT)
+        view.lookat = camera.look_at or (qpos[0], qpos[1], camera.height + climbed)
         self._renderer.update_scene(self._data, view, self._option)
         scene = self._renderer.scene
         if ghost_qpos is not None:
