@@ -133,7 +133,7 @@ class KeptStance(RowLimit):
         self._windows = windows
         self._points = Points(configuration.model, *foot_points(configuration.robot))
         self._t, self._tips = 0, np.zeros((2, 3))
-        self._landing, self._shift = np.zeros(2, bool), np.zeros((2, 2))
+        self._landing, self._shift = np.zeros(2, bool), np.zeros((2, 2, 2))
 
     def hold(self, t: int) -> None:
         """Chooses frame t. ``record`` must have been called on frame t - 1."""
@@ -145,7 +145,7 @@ class KeptStance(RowLimit):
     def record(self, configuration: Kinematics) -> None:
         """Remembers where the frame has put the feet."""
         places = configuration.positions(self._points).reshape(2, 2, 3)
-        offset, slack = self._offsets(places[..., :2])[:, TIP], self._windows.slack[self._t, :, TIP]
+        offset, slack = self._offsets(places[..., :2]), self._windows.slack[self._t]
         beside = offset - np.clip(offset, -slack, slack)
         self._shift[self._landing] = np.clip(beside, -_LANDING, _LANDING)[self._landing]
         self._tips = places[:, TIP]
@@ -172,4 +172,4 @@ class KeptStance(RowLimit):
     def _offsets(self, places: np.ndarray) -> np.ndarray:
         """(2, 2, 2) offsets of (2, 2, 2) places from the centres of their windows."""
         axes, centre = self._windows.axes[self._t][:, None], self._windows.centre[self._t]
-        return (axes @ places[..., None])[..., 0] - centre - self._shift[:, None]
+        return (axes @ places[..., None])[..., 0] - centre - self._shift
