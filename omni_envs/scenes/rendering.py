@@ -26,8 +26,8 @@ class Camera:
         azimuth: Degrees about z; 90 looks along +y.
         elevation: Degrees; negative looks down.
         distance: m from the point.
-        look_at: The point, m; None follows the robot's root, at ``height`` while it stands, squats or
-            crawls on the ground, higher as it climbs.
+        look_at: The point, m; None follows the robot's root, at ``height`` while the robot is on
+            the ground, higher as it climbs.
         height: Height of the followed point, m.
     """
 
