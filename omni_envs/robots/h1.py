@@ -70,8 +70,8 @@ def _keypoints() -> dict[str, BodyPoint]:
             f"{side}_toe": BodyPoint(f"{side}_ankle_link", (0.2, 0.0, -0.065)),
             f"{side}_shoulder": BodyPoint(f"{side}_shoulder_roll_link"),
             f"{side}_elbow": BodyPoint(f"{side}_elbow_link"),
-            # The forearm ends here: H1 has no hand.
-            f"{side}_hand": BodyPoint(f"{side}_elbow_link", (0.2605, 0.0, -0.0185)),
+            # H1 has no hand: the last 7 cm of its forearm play it, in a human's proportion.
+            f"{side}_hand": BodyPoint(f"{side}_elbow_link", (0.2, 0.0, -0.0185)),
         }
     return points
 

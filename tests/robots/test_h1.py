@@ -98,7 +98,7 @@ def test_keypoints(standing: Callable[[Robot], dict[str, np.ndarray]]) -> None:
         assert np.linalg.norm(joint["ankle"] - joint["knee"]) == pytest.approx(0.4, abs=1e-9)
         upper_arm = np.linalg.norm(joint["elbow"] - joint["shoulder"])
         assert upper_arm == pytest.approx(np.hypot(0.1343 + 0.198, 0.0185), abs=1e-9)
-        assert np.linalg.norm(joint["hand"] - joint["elbow"]) == pytest.approx(0.2612, abs=1e-4)
+        assert np.linalg.norm(joint["hand"] - joint["elbow"]) == pytest.approx(0.2009, abs=1e-4)
         # The toe lies 5 mm above the sole.
         assert joint["toe"][2] == pytest.approx(0.005, abs=1e-4)
         assert joint["toe"][0] == pytest.approx(joint["ankle"][0] + 0.2, abs=1e-4)
