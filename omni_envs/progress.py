@@ -25,6 +25,8 @@ def progress_bar(
 ) -> Iterator[ProgressCallback]:
     """Shows a bar on stderr with rate and time left, fed by the callback it yields.
 
+    The bar appears with the first call: work that turns out to be done already shows none.
+
     Args:
         title: What is being done.
         unit: What is counted.
@@ -41,12 +43,16 @@ def progress_bar(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), disable=disable) as progress:
-        task = progress.add_task(title, total=None, rate="")
+    progress = Progress(*columns, console=Console(stderr=True), disable=disable)
+    task = progress.add_task(title, total=None, rate="")
 
-        def update(done: int, total: int) -> None:
-            speed = progress.tasks[0].speed
-            rate = f"{speed:.0f} {unit}/s" if speed else ""
-            progress.update(task, completed=done, total=total, rate=rate)
+    def update(done: int, total: int) -> None:
+        progress.start()
+        speed = progress.tasks[0].speed
+        rate = f"{speed:.0f} {unit}/s" if speed else ""
+        progress.update(task, completed=done, total=total, rate=rate)
 
+    try:
         yield update
+    finally:
+        progress.stop()

@@ -14,3 +14,19 @@ def test_disabled_bar_is_silent(capsys):
         update(1, 2)
     captured = capsys.readouterr()
     assert captured.err.strip() == "" and captured.out == ""
+
+
+def test_work_that_is_done_already_shows_no_bar(capsys):
+    with progress_bar("Retargeting"):
+        pass
+    assert capsys.readouterr().err.strip() == ""
+
+
+def test_bar_is_left_behind_when_work_fails(capsys):
+    try:
+        with progress_bar("Retargeting") as update:
+            update(1, 10)
+            raise ValueError
+    except ValueError:
+        pass
+    assert "1/10" in capsys.readouterr().err

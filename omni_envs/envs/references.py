@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Union
@@ -11,6 +12,7 @@ import numpy as np
 
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.errors import InvalidOptionError
+from omni_envs.progress import progress_bar
 from omni_envs.references import Reference
 from omni_envs.robots import Robot
 from omni_envs.scenes import Scene
@@ -55,7 +57,9 @@ def _resolve(item: ReferenceLike, robot: Robot) -> Reference:
     if isinstance(item, Demonstration):
         from omni_envs.references import cached_reference
 
-        return cached_reference(item, robot)
+        title = f"{item.name} → {robot.title}"
+        with progress_bar(title, disable=not sys.stderr.isatty()) as progress:
+            return cached_reference(item, robot, progress=progress)
     raise InvalidOptionError(
         "reference: expected a path, a Reference, a Demonstration or a list of these; "
         f"got {type(item).__name__}."
