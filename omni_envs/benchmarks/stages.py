@@ -43,8 +43,9 @@ class StageSampler:
 
     def shares(self) -> dict[str, float]:
         """Share of the time by stage, the largest first; empty without a sample."""
-        total = self._counts.total()
-        return {stage: count / total for stage, count in self._counts.most_common()}
+        counts = Counter(self._counts)  # the signal may add a sample at any moment
+        total = counts.total()
+        return {stage: count / total for stage, count in counts.most_common()}
 
     def _look(self, signum: int, frame: FrameType | None) -> None:
         stage = claimed = None

@@ -2,7 +2,6 @@
 
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.options import RetargetOptions, StanceOptions
-from omni_envs.retargeting.parallel import retarget_many
 from omni_envs.retargeting.refine import RefineOptions, refine
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.retarget import deformation_energy, retarget
@@ -18,5 +17,4 @@ __all__ = [
     "deformation_energy",
     "refine",
     "retarget",
-    "retarget_many",
 ]
