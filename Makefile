@@ -29,7 +29,7 @@ $(VENV)/.demo: pyproject.toml constraints.txt | $(BIN)/python
 
 $(VENV)/.test: $(VENV)/.demo
 	@echo "==> Installing the test tools"
-	$(BIN)/python -m pip install -c constraints.txt -e '.[placo,dev]'
+	$(BIN)/python -m pip install -c constraints.txt -e '.[placo,torchrl,dev]'
 	@touch $@
 
 demo: $(VENV)/.demo  ## Demonstration → reference → policy → ONNX → video, in under 10 minutes
