@@ -56,6 +56,7 @@ def run_demo(
         except ImportError as error:
             raise MissingDependencyError(package, extra, "The demo") from error
     from omni_envs.export import export_run
+    from omni_envs.training.curve import plot_curve
     from omni_envs.training.evaluate import evaluate_run
     from omni_envs.training.recipes import RECIPES
     from omni_envs.training.run import train
@@ -104,7 +105,7 @@ def run_demo(
         "reference_strip": str(out / "reference.png"),
         "policy": str(exported["path"]),
         **pictures,
-        "curve": str(run / "curve.png"),
+        "curve": str(plot_curve(run, trained.history, trained.control_dt)),
         "penetration_max_m": reference.report.summary()["penetration_max_m"],  # type: ignore[union-attr]
         "steps": trained.steps,
         "steps_per_s": trained.steps / trained.seconds,
