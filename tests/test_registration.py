@@ -4,7 +4,7 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 
 from omni_envs import registration
-from omni_envs.errors import UnknownNameError
+from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.references import reference_from_qpos
 from omni_envs.robots import G1, robot_names
 
@@ -65,3 +65,9 @@ def test_unknown_id():
 
     with pytest.raises(UnknownNameError, match="Valid: OmniEnvs/G1BoxCarry-v0"):
         bench_step("OmniEnvs/G1Juggle-v0")
+
+
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec])
+def test_unknown_option_of_make_lists_the_valid_ones(make):
+    with pytest.raises(InvalidOptionError, match=r"'rewrd'.*Did you mean 'reward'.*randomization"):
+        make("OmniEnvs/G1BoxCarry-v0", rewrd={})

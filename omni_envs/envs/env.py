@@ -114,7 +114,7 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
         ]
         for name in options:
             if name not in valid:
-                raise UnexpectedOptionError(type(self).__name__, name, valid)
+                raise UnexpectedOptionError.of(type(self).__name__, name, valid)
         self.vector = OmniVectorEnv(
             1, num_threads=1, autoreset_mode=AutoresetMode.DISABLED, **options
         )

@@ -19,17 +19,23 @@ class UnexpectedOptionError(InvalidOptionError, TypeError):
     It is a ``TypeError`` too, as for any function; some libraries try keywords out and rely on
     that.
 
-    Args:
-        owner: The environment class.
-        name: The keyword.
-        valid: The keywords that exist.
+    ``gymnasium.make`` raises a ``TypeError`` anew from its message alone, so the message is all
+    that the constructor takes; see ``of``.
     """
 
-    def __init__(self, owner: str, name: str, valid: Iterable[str]) -> None:
+    @classmethod
+    def of(cls, owner: str, name: str, valid: Iterable[str]) -> UnexpectedOptionError:
+        """Returns the error of a keyword.
+
+        Args:
+            owner: The environment class.
+            name: The keyword.
+            valid: The keywords that exist.
+        """
         valid = sorted(valid)
         close = get_close_matches(name, valid, n=1)
         hint = f" Did you mean {close[0]!r}?" if close else ""
-        super().__init__(
+        return cls(
             f"{owner}.__init__() got an unexpected keyword argument '{name}'.{hint} "
             f"Valid: {', '.join(valid)}."
         )
@@ -44,7 +50,7 @@ def refuse_unknown(cls: type, unknown: Mapping[str, Any]) -> None:
     parameters = inspect.signature(cls.__init__).parameters.values()  # type: ignore[misc]
     valid = [p.name for p in parameters if p.name != "self" and p.kind is not p.VAR_KEYWORD]
     for name in unknown:
-        raise UnexpectedOptionError(cls.__name__, name, valid)
+        raise UnexpectedOptionError.of(cls.__name__, name, valid)
 
 
 def autoreset_mode_of(mode: AutoresetMode | str) -> AutoresetMode:
