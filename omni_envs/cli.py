@@ -129,7 +129,8 @@ class Retarget:
             path = self.out / f"{demonstration.name}.npz" if several else self.out
             path.parent.mkdir(parents=True, exist_ok=True)
             reference.save(path)
-            rows.append({**_summary(reference), **_speed(reference)})
+            assert reference.report is not None  # make_reference always evaluates
+            rows.append({**reference.report.summary(), **_speed(reference)})
             if not self.json:
                 _show(f"{demonstration.name} → {robot.title}: {path}", rows[-1], False)
         if self.json:
@@ -359,12 +360,6 @@ Command = (
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Export, tyro.conf.subcommand("export")]
 )
-
-
-def _summary(reference: Any) -> dict[str, Any]:
-    from omni_envs.references import evaluate_reference
-
-    return evaluate_reference(reference).summary()
 
 
 def _speed(reference: Any) -> dict[str, float]:

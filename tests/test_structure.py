@@ -15,6 +15,7 @@ ORDER = (
     "rotations",
     "resampling",
     "progress",
+    "threads",
     "rotations",
     "robots",
     "scenes",

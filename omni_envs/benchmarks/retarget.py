@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -27,6 +25,7 @@ from omni_envs.errors import InvalidOptionError, OmniEnvsError
 from omni_envs.retargeting import RetargetOptions, retarget
 from omni_envs.retargeting.comparators import GMR_MATCHES, gmr_retarget
 from omni_envs.robots import Robot, get_robot
+from omni_envs.threads import one_maths_thread
 
 STAGES = {
     "interaction_mesh": "mesh",
@@ -46,7 +45,6 @@ WHOLE_STAGES = {"_restore": "restoration", "_sketch": "footholds"}
 
 _T = TypeVar("_T")
 _WALL, _CPU = 0, 1
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _WARM_UP_FRAMES = 3
 _PROFILED_RUNS = 2
 # A source this far away is the same to the eye and another to the cache of interaction meshes.
@@ -94,7 +92,7 @@ def bench_retarget(
     get_robot(robot)
     demonstration = source if isinstance(source, Demonstration) else load_demonstration(source)
     # A fresh process: thread counts are read when numpy loads, and the peak of memory is its own.
-    with _one_thread(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    with one_maths_thread(), ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(_measure_safely, demonstration, robot, repeats, options).result()
 
 
@@ -223,18 +221,3 @@ def _peak_megabytes() -> float | None:
     except ImportError:  # Windows
         return None
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6  # bytes on macOS
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Has processes that are started within use one thread."""
-    saved = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
-    try:
-        yield
-    finally:
-        for name, value in saved.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
 from typing import Any
 
 from omni_envs.demonstrations import Demonstration
@@ -16,9 +15,9 @@ from omni_envs.references.build import make_reference
 from omni_envs.references.reference import Reference
 from omni_envs.retargeting import RetargetOptions
 from omni_envs.robots import Robot, get_robot, register_robot, robot_names
+from omni_envs.threads import one_maths_thread
 
 _POLL_SECONDS = 0.2
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _counter: Any = None
 """In a worker: the count of solved frames, shared by all processes."""
@@ -60,7 +59,7 @@ def make_references(
     context = multiprocessing.get_context("spawn")
     counter = context.Value("q", 0)
     with (
-        _one_maths_thread(),
+        one_maths_thread(),
         ProcessPoolExecutor(jobs, context, _start_worker, (counter, robot)) as pool,
     ):
         # Long clips first, so that no process ends up alone with one.
@@ -99,18 +98,3 @@ def _make(
     except OmniEnvsError as error:
         # Subclasses take other arguments than their message, so they do not unpickle.
         return OmniEnvsError(str(error))
-
-
-@contextmanager
-def _one_maths_thread() -> Iterator[None]:
-    """Maths libraries read these when a worker imports them: threads × processes would fight."""
-    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -6,9 +6,6 @@ from omni_envs.tracking import quaternion
 from omni_envs.tracking.alignment import Bodies
 from omni_envs.tracking.array_api import Array, array_namespace
 
-TERMINATION_TESTS = ("anchor_height", "anchor_tilt", "end_effector_height", "object")
-"""Names of the tests; that of the object is absent without one."""
-
 
 def height_lost(position: Array, reference: Array, threshold: float) -> Array:
     """Returns (N,) whether |Δz| of (N, 3) positions exceeds the threshold, m."""
