@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from omni_envs import retargeting
+from omni_envs.benchmarks.memory import peak_bytes
 from omni_envs.benchmarks.stages import StageSampler
 from omni_envs.demonstrations import (
     Demonstration,
@@ -116,11 +117,11 @@ def measure(
     if with_gmr:
         gmr_retarget(warm_up, machine)
     cold, cached, gmr = _Times(), _Times(), _Times()
-    peak: float | None = None
+    peak: int | None = None
     for i in range(repeats):
         fresh = _nudged(motion, i + 1)
         cold.run(retarget, fresh, machine, options)
-        peak = peak or _peak_megabytes()
+        peak = peak or peak_bytes()
         if with_gmr:
             theirs = gmr.run(gmr_retarget, demonstration, machine)
             # Without what comes before the first frame.
@@ -142,7 +143,7 @@ def measure(
         "ratio_to_gmr_cold": cold.times_faster_than(gmr) if with_gmr else None,
         "iterations_per_frame": float(ours.frames.iterations.mean()),
         "gmr_iterations_per_frame": float(theirs.iterations.mean()) if with_gmr else None,
-        "peak_memory_mb": peak,
+        "peak_memory_mb": None if peak is None else peak / 1e6,
         "ms_per_frame": 1e3 / cold_speed[_CPU],
     }
     if StageSampler.available():
@@ -206,18 +207,3 @@ def _first_frames(demonstration: Demonstration, count: int) -> Demonstration:
         object_poses=cut(demonstration.object_poses),
         contacts={link: flags[:count] for link, flags in demonstration.contacts.items()},
     )
-
-
-def _peak_megabytes() -> float | None:
-    """Largest memory this process ever had, MB."""
-    try:
-        # Not getrusage: there, a child starts with the peak of its parent.
-        with open("/proc/self/status") as status:
-            return next(int(row.split()[1]) / 1e3 for row in status if row.startswith("VmHWM"))
-    except (OSError, StopIteration):
-        pass
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6  # bytes on macOS

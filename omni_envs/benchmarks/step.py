@@ -13,6 +13,7 @@ from mujoco.batch import Batch
 
 import omni_envs
 from omni_envs import registration
+from omni_envs.benchmarks.memory import peak_bytes, reset_peak
 from omni_envs.envs import OmniVectorEnv
 from omni_envs.errors import UnknownNameError
 
@@ -52,10 +53,10 @@ def bench_step(
 
     Returns:
         ``steps_per_s`` and ``raw_steps_per_s`` (control steps, medians), ``ratio`` (median over the
-        pairs of slices), ``bytes_per_env`` (growth of the process by making and running the
-        environment), and the conditions.
+        pairs of slices), ``bytes_per_env`` (growth of the process's peak by making and
+        running the environment, None where the system does not tell), and the conditions.
     """
-    base = _resident_bytes()
+    base = reset_peak()
     started = time.perf_counter()
     vector = _make(env, num_envs, num_threads, options)
     construct = time.perf_counter() - started
@@ -63,7 +64,8 @@ def bench_step(
     observations, _ = vector.reset(seed=seed)
     for _ in range(PAIRS):
         observations = vector.step(_aim(vector, observations, rng))[0]
-    memory = (_resident_bytes() - base) / num_envs
+    peak = peak_bytes()
+    memory = None if peak is None or base is None else round((peak - base) / num_envs)
     live = vector.simulation.batch
     raw = Batch(vector.simulation.model, num_envs, live.nthread)
     substeps = vector.config.physics.substeps
@@ -85,7 +87,7 @@ def bench_step(
     figures = _measure(pair, num_envs, seconds)
     vector.close()
     return figures | {
-        "bytes_per_env": round(memory),
+        "bytes_per_env": memory,
         "construct_seconds": construct,
         "num_envs": num_envs,
         "num_threads": live.nthread,
@@ -194,14 +196,3 @@ def _make(env: str, num_envs: int, num_threads: int, options: dict[str, Any]) ->
         raise UnknownNameError("environment", env, ids)
     made: Any = gymnasium.make_vec(env, num_envs=num_envs, num_threads=num_threads, **options)
     return made.unwrapped
-
-
-def _resident_bytes() -> int:
-    """Memory of this process: resident where the system tells, else the peak so far."""
-    try:
-        with open("/proc/self/status") as status:
-            return next(int(row.split()[1]) * 1024 for row in status if row.startswith("VmRSS"))
-    except (OSError, StopIteration):
-        import resource
-
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
