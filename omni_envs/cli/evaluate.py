@@ -1,0 +1,68 @@
+"""``omni-envs evaluate``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import tyro
+
+from omni_envs.cli.output import show
+from omni_envs.errors import InvalidOptionError
+
+
+@dataclass
+class Evaluate:
+    """Metrics of references, ours or a peer's."""
+
+    references: tyro.conf.Positional[tuple[Path, ...]]
+    """Reference files, or robot motions of OmniRetarget's dataset and holosoma (.npz)."""
+
+    source: str | None = None
+    """What a peer's motion was made from: a demonstration file or the name of a built-in one. Our
+    own references carry it."""
+
+    robot: str = "g1"
+    """Robot of a peer's motion."""
+
+    object: Path | None = None
+    """Mesh of the object, where the source does not carry it."""
+
+    terrain: Path | None = None
+    """Mesh of the terrain at human scale, where it does not lie beside the source."""
+
+    height: float | None = None
+    """Standing height of the human in metres, where the source does not tell it."""
+
+    picture: Path | None = None
+    """Draw the report of a single reference on a page (.png, .pdf or .svg)."""
+
+    details: bool = False
+    """Print every figure, not only the headlines."""
+
+    json: bool = False
+    """Print JSON: one object per file, in a list if there are several files."""
+
+    def run(self) -> None:  # noqa: D102
+        from omni_envs.demonstrations import load_demonstration
+        from omni_envs.references import evaluate_reference, open_reference, report_picture
+
+        if self.picture is not None and len(self.references) != 1:
+            raise InvalidOptionError("--picture: draws one reference; give a single file.")
+        demonstration = None
+        if self.source is not None:
+            demonstration = load_demonstration(
+                self.source, object_mesh=self.object, terrain_mesh=self.terrain, height=self.height
+            )
+        rows = []
+        for path in self.references:
+            reference = open_reference(path, self.robot, demonstration)
+            report = evaluate_reference(reference)
+            if self.picture is not None:
+                report_picture(replace(reference, report=report), self.picture)
+            rows.append(report.details() if self.details else report.summary())
+            if not self.json:
+                show(str(path), rows[-1], False)
+        if self.json:
+            print(json.dumps(rows[0] if len(rows) == 1 else rows, allow_nan=False))
