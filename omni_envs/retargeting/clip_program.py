@@ -21,6 +21,7 @@ from omni_envs.retargeting.kept_stance import (
 )
 from omni_envs.retargeting.kinematics import Kinematics, Points
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, Rows
+from omni_envs.retargeting.nominal_task import nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.qp import step_rows
 from omni_envs.retargeting.stance_plan import stance_tiers
@@ -36,10 +37,15 @@ _RESERVE = 0.005
 _K = len(KEYPOINTS)
 
 
+def difference(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """(T, nv) tangents end ⊖ start of (T, 7 + n) configurations."""
+    turn = rotations.difference(start[:, 3:7], end[:, 3:7])
+    return np.hstack([end[:, :3] - start[:, :3], turn, end[:, 7:] - start[:, 7:]])
+
+
 def motion_steps(qpos: np.ndarray) -> np.ndarray:
     """(T - 1, nv) tangents q_{t+1} ⊖ q_t of (T, 7 + n) configurations."""
-    linear, joints = np.diff(qpos[:, :3], axis=0), np.diff(qpos[:, 7:], axis=0)
-    return np.hstack([linear, rotations.difference(qpos[:-1, 3:7], qpos[1:, 3:7]), joints])
+    return difference(qpos[:-1], qpos[1:])
 
 
 def moved(qpos: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -52,7 +58,7 @@ def moved(qpos: np.ndarray, x: np.ndarray) -> np.ndarray:
 class ClipProgram:
     """The smoothness problem of one clip.
 
-    minimise Σ_t ½ w E_t + ½ w_v ‖v_t‖²_S + ½ w_a ‖v_{t+1} - v_t‖²_S + contact + posture,
+    minimise Σ_t ½ w E_t + ½ w_v ‖v_t‖²_S + ½ w_a ‖v_{t+1} - v_t‖²_S + contact + posture + nominal,
     v_t = q_{t+1} ⊖ q_t, subject to the constraints of ``retarget``, with stance relative to the
     motion that is refined.
 
@@ -62,6 +68,7 @@ class ClipProgram:
         options: Settings of the retargeter.
         acceleration_weight: Weight of ‖acceleration‖²_S on every frame, SI units.
         qpos: (T, nq) the motion to refine.
+        nominal: (T, nq) the motion that it was anchored to, or None.
     """
 
     def __init__(
@@ -71,6 +78,7 @@ class ClipProgram:
         options: RetargetOptions,
         acceleration_weight: float,
         qpos: np.ndarray,
+        nominal: np.ndarray | None = None,
     ) -> None:
         self.source, self.robot = source, robot
         self.configuration = Kinematics(
@@ -88,6 +96,11 @@ class ClipProgram:
         self._touch = ContactTask(source, self.configuration, options.contact_weight)
         metric = self.configuration.metric
         self._velocity_weight = options.smoothness_weight * metric
+        self._nominal, self._nominal_weight = nominal, np.zeros((len(qpos), robot.nv))
+        if nominal is not None:
+            self._nominal_weight = nominal_weights(
+                self.configuration, options, len(qpos), source.fps
+            )
         self._acceleration_weight = acceleration_weight * source.fps**4 * metric
         self._step = np.full(robot.num_joints, np.inf)
         if options.velocity_limits is not None:
@@ -165,7 +178,7 @@ class ClipProgram:
     def _add_smoothness(
         self, H: np.ndarray, g: np.ndarray, qpos: np.ndarray, start: int
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Adds velocity, acceleration and posture; returns the off-diagonals D and E.
+        """Adds velocity, acceleration, posture and nominal motion; returns D and E.
 
         To first order v_t changes by x_{t+1} - x_t, as the root turns little between frames.
         """
@@ -174,6 +187,9 @@ class ClipProgram:
         diagonal = np.tile(self._posture_weight + _RIDGE, (count, 1))
         gradient = np.zeros((count, n))
         gradient[:, 6:] = self._posture_weight[6:] * qpos[:, 7:]
+        if self._nominal is not None:
+            diagonal += self._nominal_weight
+            gradient -= self._nominal_weight * difference(qpos, self._nominal)
         D, E = np.zeros((max(count - 1, 0), n)), np.zeros((max(count - 2, 0), n))
         weight = self._velocity_weight
         diagonal[1:] += weight

@@ -57,6 +57,10 @@ class RetargetOptions:
         smoothness_weight: Weight of the distance to the previous frame (OmniRetarget: 0.2).
         contact_weight: Weight of the distance between a touching link and the point of the surface
             that the human touches, 0 switches it off. Not in the paper.
+        nominal_weight: Weight of base and legs against a nominal motion, where ``retarget`` is
+            given one (OmniRetarget: 5).
+        nominal_decay: Time in which that weight falls to 1/e, s (OmniRetarget: 10 frames at 30 fps
+            where the object was changed); None keeps it (where the terrain was).
         trust_region: Radius of one step in the metric S, where ‖δquaternion‖ counts (OmniRetarget:
             0.2).
         iterations: Most steps per frame (OmniRetarget: 10).
@@ -82,6 +86,8 @@ class RetargetOptions:
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
     contact_weight: float = 100.0
+    nominal_weight: float = 5.0
+    nominal_decay: float | None = 1.0 / 3.0
     trust_region: float = 0.2
     iterations: int = 10
     first_iterations: int = 50
@@ -110,5 +116,7 @@ class RetargetOptions:
             _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
         limits = self.velocity_limits
         _require(limits is None or limits > 0, "velocity_limits", "positive or None", limits)
+        decay = self.nominal_decay
+        _require(decay is None or decay > 0, "nominal_decay", "positive (s) or None", decay)
         _require(self.solver in ("daqp", "clarabel"), "solver", "daqp or clarabel", self.solver)
         _require(self.backend in ("mink", "placo"), "backend", "mink or placo", self.backend)

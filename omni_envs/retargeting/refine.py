@@ -84,7 +84,12 @@ def refine(
     robot, frames = get_robot(retargeted.robot), retargeted.num_frames
     qpos = retargeted.qpos
     program = ClipProgram(
-        retargeted.source, robot, retargeted.options, options.acceleration_weight, qpos
+        retargeted.source,
+        robot,
+        retargeted.options,
+        options.acceleration_weight,
+        qpos,
+        retargeted.nominal,
     )
     total, done = frames * (len(options.radii) + 1), 0
     for radius in options.radii:

@@ -48,6 +48,7 @@ class Retargeted:
         source: What it follows, at the same ``fps``.
         options: Settings it was made with.
         frames: What happened on every frame.
+        nominal: (T, 7 + n) motion that it was anchored to, or None.
     """
 
     robot: str
@@ -57,6 +58,7 @@ class Retargeted:
     source: SourceMotion
     options: RetargetOptions
     frames: SolveRecord
+    nominal: np.ndarray | None = None
 
     @property
     def num_frames(self) -> int:

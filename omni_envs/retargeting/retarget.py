@@ -4,6 +4,7 @@ On every frame t (OmniRetarget, arXiv 2509.26633, eq. 3-4):
 
     minimise   w ‖L(p(q)) - δ_t‖²                 ``interaction_mesh``, ``interaction_mesh_task``
                + ‖q ⊖ q_{t-1}‖²_Q  + posture      ``proximal_task``
+               + ‖q ⊖ q_nominal‖²_N              ``nominal_task``, where there is one
     subject to φ_j(q) ≥ 0                         ``contact_limit``: surroundings and self
                q_min ≤ q ≤ q_max                  ``joint_limits``
                |q - q_{t-1}| ≤ v_max Δt           ``joint_limits``
@@ -31,18 +32,21 @@ from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import RowLimit
+from omni_envs.retargeting.nominal_task import NominalTask, check_nominal, nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.retargeting.stance_limit import StanceLimit
 from omni_envs.retargeting.stance_plan import (
+    ANCHORED,
     FootWishes,
     StancePlan,
     foot_wishes,
     plan_stance,
     stance_tiers,
 )
+from omni_envs.retargeting.tasks import CostTask
 from omni_envs.robots import KEYPOINTS, SIDES, Robot
 
 # Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
@@ -58,6 +62,7 @@ def retarget(
     robot: Robot,
     options: RetargetOptions | None = None,
     progress: ProgressCallback | None = None,
+    nominal: Retargeted | np.ndarray | None = None,
 ) -> Retargeted:
     """Retargets a source motion to a robot.
 
@@ -69,17 +74,24 @@ def retarget(
         robot: The robot.
         options: Settings.
         progress: Called with (frames done, frames in all).
+        nominal: For an augmented source, the motion of the unchanged one, or its (T, 7 + n)
+            configurations: base and legs are anchored to it, and the feet start where it has them
+            (section III-B).
 
     Returns:
         The robot motion at the source's fps.
 
     Raises:
-        InvalidDataError: The source is not finite, has no frames or no frame rate.
+        InvalidDataError: The source is not finite, has no frames or no frame rate, or the nominal
+            motion is not one of this robot with as many frames.
     """
     options = options or RetargetOptions()
     _check(source)
+    if nominal is not None:
+        given = nominal.qpos if isinstance(nominal, Retargeted) else nominal
+        nominal = check_nominal(robot, given, source.num_frames)
     mesh = InteractionMesh.of(source, options.surface_points)
-    return _Retargeter(source, robot, options, mesh).run(progress)
+    return _Retargeter(source, robot, options, mesh, nominal).run(progress)
 
 
 def deformation_energy(
@@ -146,9 +158,15 @@ class _Retargeter:
     """The tasks and limits of one clip, and the loop over its frames."""
 
     def __init__(
-        self, source: SourceMotion, robot: Robot, options: RetargetOptions, mesh: InteractionMesh
+        self,
+        source: SourceMotion,
+        robot: Robot,
+        options: RetargetOptions,
+        mesh: InteractionMesh,
+        nominal: np.ndarray | None,
     ) -> None:
         self.source, self.robot, self.options = source, robot, options
+        self.nominal_motion = nominal
         kinematics: type[Kinematics] = Kinematics
         step_solver = solve_daqp if options.solver == "daqp" else solve_clarabel
         if options.backend == "placo":
@@ -175,11 +193,18 @@ class _Retargeter:
         if options.velocity_limits is not None:
             self.velocity = StepVelocityLimit(robot, source.fps, options.velocity_limits)
             bounds.append(self.velocity)
+        tasks: list[CostTask] = [self.mesh, self.smoothness, self.posture]
+        if options.contact_weight > 0 and source.contact_points:
+            tasks.append(self.touch)
+        self.nominal: NominalTask | None = None
+        if nominal is not None:
+            weights = nominal_weights(self.configuration, options, source.num_frames, source.fps)
+            self.nominal = NominalTask(nominal, weights)
+            tasks.append(self.nominal)
         self.limits: list[RowLimit] = [ContactLimit(options.penetration_tolerance)]
         self.solver = FrameSolver(
             self.configuration,
-            [self.mesh, self.smoothness, self.posture]
-            + ([self.touch] if options.contact_weight > 0 and source.contact_points else []),
+            tasks,
             bounds,
             self.limits,
             step_solver,
@@ -237,6 +262,7 @@ class _Retargeter:
             self.source,
             self.options,
             record,
+            self.nominal_motion,
         )
 
     def _ahead(self, before: np.ndarray, previous: np.ndarray) -> np.ndarray:
@@ -247,8 +273,10 @@ class _Retargeter:
         return q
 
     def _place(self, t: int) -> None:
-        """Sets the scene and the mesh to frame t."""
+        """Sets the scene, the mesh and the nominal pose to frame t."""
         self.mesh.set_frame(t)
+        if self.nominal is not None:
+            self.nominal.set_frame(t)
         if self.source.object_poses is not None:
             self.configuration.place_object(self.source.object_poses[t])
 
@@ -260,7 +288,10 @@ class _Retargeter:
         best: FrameResult | None = None
         lowest = np.inf
         options = self.options
-        for pose in aligned_poses(self.configuration, self.source.keypoints[0]):
+        starts = aligned_poses(self.configuration, self.source.keypoints[0])
+        if self.nominal_motion is not None:
+            starts = [self.nominal_motion[0]]
+        for pose in starts:
             result = self.solver.solve(
                 pose,
                 options.first_iterations // 2,
@@ -308,4 +339,13 @@ class _Retargeter:
             _interpolate(frames, every, wishes.lying),
         )
         tier = stance_tiers(source, self.options.stance)
+        if self.nominal_motion is not None:
+            # The paper's p_0^F = p̄_0^F: feet that stand on frame 0 stand where the nominal ones do.
+            self.configuration.update(self.nominal_motion[0])
+            start = foot_wishes(self.configuration.feet()[None, :, :, :2])
+            standing = np.logical_and.accumulate(tier == ANCHORED)
+            wishes.tips[standing] = np.broadcast_to(start.tips, wishes.tips.shape)[standing]
+            turn = start.headings - wishes.headings[:1]
+            same = start.headings - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+            wishes.headings[standing] = np.broadcast_to(same, tier.shape)[standing]
         return plan_stance(tier, wishes, source.fps, self.options.stance), first

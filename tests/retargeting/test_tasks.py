@@ -9,6 +9,8 @@ from omni_envs.retargeting.contact_task import ContactTask
 from omni_envs.retargeting.foothold_task import FootholdTask
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.nominal_task import NominalTask, nominal_weights
+from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.stance_plan import StancePlan
 from omni_envs.robots import G1
@@ -52,10 +54,19 @@ def tasks(grasp, configuration):
     near.set_target(G1.default_qpos)
     touch = ContactTask(grasp, configuration, 60.0)
     touch.set_frame(50)
-    return {"mesh": mesh, "proximal": near, "contact": touch, "foothold": foothold_task()}
+    weights = nominal_weights(configuration, RetargetOptions(), 60, 30.0)
+    nominal = NominalTask(np.tile(G1.default_qpos, (60, 1)), weights)
+    nominal.set_frame(4)
+    return {
+        "mesh": mesh,
+        "proximal": near,
+        "contact": touch,
+        "foothold": foothold_task(),
+        "nominal": nominal,
+    }
 
 
-@pytest.mark.parametrize("name", ["mesh", "proximal", "contact", "foothold"])
+@pytest.mark.parametrize("name", ["mesh", "proximal", "contact", "foothold", "nominal"])
 def test_model(grasp, configuration, q, name):
     task = tasks(grasp, configuration)[name]
     configuration.update(q)
