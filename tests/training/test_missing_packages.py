@@ -18,7 +18,7 @@ def _import_without(monkeypatch, package: str, module: str) -> None:
     importlib.import_module(module)
 
 
-@pytest.mark.parametrize("module", ["run", "ppo", "policy", "sb3_vec_env"])
+@pytest.mark.parametrize("module", ["sb3_learner", "ppo", "policy", "sb3_vec_env"])
 def test_training_names_the_extra(monkeypatch, module):
     with pytest.raises(MissingDependencyError, match=r"omni-envs\[sb3\]"):
         _import_without(monkeypatch, "stable_baselines3", f"omni_envs.training.{module}")

@@ -1,0 +1,111 @@
+"""Stable-Baselines3 as the trainer of a run."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from gymnasium.vector import VectorEnv
+
+from omni_envs.errors import MissingDependencyError
+
+try:
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.vec_env import VecMonitor
+except ImportError as error:
+    raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
+
+from omni_envs.training.checkpoint import Checkpoint
+from omni_envs.training.config import TrainConfig
+from omni_envs.training.learner import History
+from omni_envs.training.ppo import TrackingPPO
+from omni_envs.training.rollout import BODY_ERROR
+from omni_envs.training.sb3_vec_env import SB3VecEnv
+
+
+class SB3Learner:
+    """``TrackingPPO`` in a vector environment; see ``Learner``.
+
+    Args:
+        config: The run.
+        env: Vector environment in SAME_STEP autoreset mode.
+    """
+
+    def __init__(self, config: TrainConfig, env: VectorEnv) -> None:
+        adapter = SB3VecEnv(env)
+        self._seed = config.seed
+        self._ppo = TrackingPPO(VecMonitor(adapter), config.ppo, seed=config.seed)
+        self._errors = _TrackingError(adapter)
+
+    @property
+    def steps(self) -> int:
+        """Control steps so far."""
+        return self._ppo.num_timesteps
+
+    def learn(self) -> dict[str, float]:
+        """Collects a rollout and updates the network; see ``Learner``."""
+        ppo = self._ppo
+        ppo.learn(1, callback=self._errors, log_interval=None, reset_num_timesteps=False)
+        episodes = ppo.ep_info_buffer or ()
+
+        def mean(key: str) -> float:
+            return float(np.mean([e[key] for e in episodes])) if episodes else float("nan")
+
+        return {
+            "episode_length": mean("l"),
+            "episode_return": mean("r"),
+            "body_error_m": self._errors.mean,
+            **ppo.figures,
+        }
+
+    def state(self, seconds: float, history: History) -> Checkpoint:
+        """Returns the state between two updates; see ``Learner``."""
+        ppo = self._ppo
+        return Checkpoint(
+            steps=ppo.num_timesteps,
+            seconds=seconds,
+            updates=ppo._n_updates,
+            learning_rate=ppo.current_learning_rate,
+            policy=ppo.policy.state_dict(),
+            optimizer=ppo.policy.optimizer.state_dict(),
+            rng=torch.get_rng_state(),
+            history=history,
+            episodes=[(float(e["r"]), float(e["l"])) for e in ppo.ep_info_buffer or ()],
+        )
+
+    def restore(self, state: Checkpoint) -> None:
+        """Goes on from a state; see ``Learner``."""
+        ppo = self._ppo
+        ppo.policy.load_state_dict(state.policy)
+        ppo.policy.optimizer.load_state_dict(state.optimizer)
+        ppo.num_timesteps, ppo._n_updates = state.steps, state.updates
+        ppo.current_learning_rate = state.learning_rate
+        window = ppo._stats_window_size
+        ppo.ep_info_buffer = deque(({"r": r, "l": n} for r, n in state.episodes), maxlen=window)
+        ppo.ep_success_buffer = deque(maxlen=window)
+        ppo.env.seed((self._seed + state.steps) % 2**31)
+        torch.set_rng_state(state.rng)
+
+    def close(self) -> None:
+        """Nothing to free: the environment belongs to the caller."""
+
+
+class _TrackingError(BaseCallback):
+    """Mean tracking error over the steps of a rollout."""
+
+    def __init__(self, env: SB3VecEnv) -> None:
+        super().__init__()
+        self._env = env
+        self.mean = float("nan")
+        self._values: list[float] = []
+
+    def _on_step(self) -> bool:
+        value = self._env.batched_infos.get(BODY_ERROR)
+        if value is not None:
+            self._values.append(float(np.mean(value)))
+        return True
+
+    def _on_rollout_end(self) -> None:
+        self.mean = float(np.mean(self._values)) if self._values else float("nan")
+        self._values.clear()
