@@ -15,7 +15,7 @@ import numpy as np
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.surface import closest_points
 from omni_envs.rotations import conjugate, rotate
-from omni_envs.scenes import Part
+from omni_envs.scenes import Terrain
 
 DISTANCE = 0.02
 """A joint within this distance of a surface touches it, m."""
@@ -36,7 +36,7 @@ def object_contacts(demonstration: Demonstration) -> _Contacts:
 
 
 def terrain_contacts(
-    demonstration: Demonstration, positions: np.ndarray, parts: tuple[Part, ...], scale: float
+    demonstration: Demonstration, positions: np.ndarray, terrain: Terrain | None, scale: float
 ) -> _Contacts:
     """Contacts with terrain, and of hands and knees with the ground too.
 
@@ -45,15 +45,22 @@ def terrain_contacts(
     Args:
         demonstration: The demonstration.
         positions: (T, J, 3) its joints at robot scale, m.
-        parts: Terrain at robot scale, may be empty.
+        terrain: Terrain at robot scale, if any.
         scale: Robot height / human height.
 
     Returns:
         Link to (T,) bool, and link to (T, 3) touched points in the world, m.
     """
 
+    parts = terrain.parts if terrain is not None else ()
+    uneven = terrain.heightfield if terrain is not None else None
+
     def project(link: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         closest, distance = closest_points(parts, points)
+        if uneven is not None:
+            found, gap = uneven.closest_points(points)
+            closest = np.where((gap < distance)[:, None], found, closest)
+            distance = np.minimum(distance, gap)
         if not link.endswith("foot"):
             ground = points[:, 2] < distance
             closest[ground] = points[ground] * (1.0, 1.0, 0.0)

@@ -100,9 +100,8 @@ def scale_demonstration(demonstration: Demonstration, robot_height: float) -> So
         poses[:, 2] += (1 - scale) * first
         contacts, points = object_contacts(demonstration)
     else:
-        parts = terrain.parts if terrain is not None else ()
         positions = scale * (demonstration.positions - offset)
-        contacts, points = terrain_contacts(demonstration, positions, parts, scale)
+        contacts, points = terrain_contacts(demonstration, positions, terrain, scale)
     stance: dict[str, np.ndarray] = {
         mode: np.column_stack(
             [stance_schedule(keypoints[:, toe], demonstration.fps, mode) for toe in toes]

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from omni_envs.robots import Robot
+from omni_envs.scenes.heightfield import THICKNESS, HeightField
 from omni_envs.scenes.scene import Scene
 from omni_envs.scenes.shapes import Box, Part
 
@@ -51,7 +52,7 @@ def build_spec(
     """Builds the model specification of a robot in a scene.
 
     Names: ground geom ``ground``, object body ``object`` with geoms ``object_0…``, terrain geoms
-    ``terrain_0…``.
+    ``terrain_0…`` and, for a height field, ``terrain``.
 
     Args:
         robot: The robot, or None for the scene alone.
@@ -78,6 +79,8 @@ def build_spec(
     if scene.terrain is not None:
         for i, part in enumerate(scene.terrain.parts):
             _add_part(spec, spec.worldbody, f"{TERRAIN}_{i}", part, _TERRAIN_RGBA, friction=1.0)
+        if scene.terrain.heightfield is not None:
+            _add_heightfield(spec, scene.terrain.heightfield)
     if scene.object is not None:
         body = spec.worldbody.add_body(name=OBJECT)
         if physics:
@@ -118,6 +121,29 @@ def _add_ground(spec: mujoco.MjSpec, scene: Scene) -> None:
         size=(0, 0, 1),
         material=GROUND,
         friction=(scene.ground_friction, 0.005, 0.0001),
+        contype=_ENVIRONMENT_BIT,
+        conaffinity=_ROBOT_BIT,
+    )
+
+
+def _add_heightfield(spec: mujoco.MjSpec, field: HeightField) -> None:
+    low, high = float(field.heights.min()), float(field.heights.max())
+    rows, columns = field.heights.shape
+    # MuJoCo stretches the heights over [0, 1] and scales them by the third size.
+    spec.add_hfield(
+        name=TERRAIN,
+        nrow=rows,
+        ncol=columns,
+        size=(0.5 * field.size[0], 0.5 * field.size[1], max(high - low, 1e-9), THICKNESS),
+        userdata=field.heights.ravel(),
+    )
+    spec.worldbody.add_geom(
+        name=TERRAIN,
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname=TERRAIN,
+        pos=(*field.position, low),
+        rgba=_TERRAIN_RGBA,
+        friction=(1.0, 0.005, 0.0001),
         contype=_ENVIRONMENT_BIT,
         conaffinity=_ROBOT_BIT,
     )

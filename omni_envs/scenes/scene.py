@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from omni_envs.errors import InvalidDataError
+from omni_envs.scenes.heightfield import HeightField
 from omni_envs.scenes.shapes import Box, ConvexMesh, Part
 
 
@@ -70,17 +71,30 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class Terrain:
-    """Static convex parts in the world frame."""
+    """Static convex parts and uneven ground in the world frame.
 
-    parts: tuple[Part, ...]
+    Attributes:
+        parts: Convex parts.
+        heightfield: Uneven ground, if any.
+    """
+
+    parts: tuple[Part, ...] = ()
+    heightfield: HeightField | None = None
+
+    def __post_init__(self) -> None:
+        if not self.parts and self.heightfield is None:
+            raise InvalidDataError("Terrain", "parts", "at least one, or a height field", "none")
 
     def surface(self) -> trimesh.Trimesh:
         """Returns the surface in the world frame."""
-        return _surface(self.parts)
+        uneven = [] if self.heightfield is None else [self.heightfield.mesh()]
+        return trimesh.util.concatenate([*(p.mesh() for p in self.parts), *uneven])
 
     def scaled(self, scale: float | np.ndarray) -> Terrain:
         """Returns the terrain scaled per axis about the world origin."""
-        return Terrain(_scaled(self.parts, scale))
+        scale = np.broadcast_to(np.asarray(scale, float), 3)
+        uneven = None if self.heightfield is None else self.heightfield.scaled(scale)
+        return Terrain(_scaled(self.parts, scale), uneven)
 
 
 @dataclass(frozen=True)
@@ -123,6 +137,12 @@ class Scene:
             }
         if self.terrain is not None:
             data["terrain"] = {"parts": parts(self.terrain.parts)}
+            if (field := self.terrain.heightfield) is not None:
+                data["terrain"]["heightfield"] = {
+                    "heights": field.heights.tolist(),
+                    "size": list(map(float, field.size)),
+                    "position": list(map(float, field.position)),
+                }
         return data
 
     @classmethod
@@ -145,13 +165,21 @@ class Scene:
                 for r in rows
             )
 
+        def heightfield(row: Mapping[str, Any] | None) -> HeightField | None:
+            if row is None:
+                return None
+            heights = np.asarray(row["heights"], float)
+            return HeightField(heights, tuple(row["size"]), tuple(row["position"]))
+
         try:
             obj, terrain = data.get("object"), data.get("terrain")
             return cls(
                 object=None
                 if obj is None
                 else SceneObject(obj["name"], parts(obj["parts"]), obj["mass"], obj["friction"]),
-                terrain=None if terrain is None else Terrain(parts(terrain["parts"])),
+                terrain=None
+                if terrain is None
+                else Terrain(parts(terrain["parts"]), heightfield(terrain.get("heightfield"))),
                 ground_friction=data["ground_friction"],
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:

@@ -10,7 +10,7 @@ from omni_envs.demonstrations import (
     scale_demonstration,
     terrain_contacts,
 )
-from omni_envs.scenes import Box, Part, Scene, Terrain
+from omni_envs.scenes import Box, HeightField, Part, Scene, Terrain
 
 
 def test_distance_decides_without_flags(pushed_box):
@@ -63,14 +63,14 @@ def standing(terrain=None):
 def test_hands_and_knees_touch_the_ground(joint, link, height, touches):
     demo = standing()
     demo.positions[1, MOCAP.joint_names.index(joint)] = [0.3, 0.4, height]
-    contacts, points = terrain_contacts(demo, demo.positions, (), 1.0)
+    contacts, points = terrain_contacts(demo, demo.positions, None, 1.0)
     assert contacts[link].tolist() == [False, touches, False]
     if touches:
         np.testing.assert_allclose(points[link][1], [0.3, 0.4, 0.0])
 
 
 def test_feet_touch_terrain_but_not_the_ground():
-    terrain = (Part(Box((1, 1, 0.25)), (5, 0, 0.25)),)
+    terrain = Terrain((Part(Box((1, 1, 0.25)), (5, 0, 0.25)),))
     demo = standing()
     toe = MOCAP.joint_names.index("LeftToeBase")
     demo.positions[0, toe] = [0, 0, 0.0]
@@ -89,3 +89,14 @@ def test_terrain_is_judged_at_robot_scale():
     source = scale_demonstration(demo, 0.89)
     assert source.contacts["left_hand"].all()
     np.testing.assert_allclose(source.contact_points["left_hand"][0], [2.5, 0, 0.25], atol=1e-9)
+
+
+def test_uneven_ground_is_touched_like_any_other():
+    demo = standing()
+    field = HeightField(np.full((5, 5), 0.3), (2.0, 2.0), (5.0, 0.0))
+    toe = MOCAP.joint_names.index("LeftToeBase")
+    demo.positions[0, toe] = [5, 0, 0.33]
+    demo.positions[1, toe] = [5, 0, 0.31]
+    contacts, points = terrain_contacts(demo, demo.positions, Terrain((), field), 1.0)
+    assert contacts["left_foot"].tolist() == [False, True, False]
+    np.testing.assert_allclose(points["left_foot"][1], [5, 0, 0.3], atol=1e-9)
