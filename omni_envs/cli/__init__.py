@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from omni_envs.cli.bench import Bench
+from omni_envs.cli.convert import Convert
 from omni_envs.cli.demo import Demo
 from omni_envs.cli.evaluate import Evaluate
 from omni_envs.cli.export import Export
@@ -21,6 +22,7 @@ Command = (
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Retarget, tyro.conf.subcommand("retarget")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Export, tyro.conf.subcommand("export")]

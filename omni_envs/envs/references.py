@@ -13,12 +13,13 @@ import numpy as np
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import progress_bar
-from omni_envs.references import Reference
+from omni_envs.references import Reference, open_reference
 from omni_envs.robots import Robot
 from omni_envs.scenes import Scene
 
 ReferenceLike = Union[str, Path, Reference, Demonstration]  # noqa: UP007
-"""A reference file, a reference, or a demonstration to make one from (and cache)."""
+"""A file of a reference or of another project's motion, a reference, or a demonstration to make one
+from (and cache)."""
 
 
 def resolve_references(
@@ -34,6 +35,7 @@ def resolve_references(
     Raises:
         InvalidOptionError: Something else was given.
         FileFormatError: A file is missing or damaged.
+        InvalidDataError: A file of another project has an object, and so needs its scene first.
     """
     if source is None:
         from omni_envs.demonstrations import builtin_demonstration
@@ -53,7 +55,7 @@ def _resolve(item: ReferenceLike, robot: Robot) -> Reference:
     if isinstance(item, Reference):
         return item
     if isinstance(item, str | Path):
-        return Reference.load(item)
+        return open_reference(item, robot)
     if isinstance(item, Demonstration):
         from omni_envs.references import cached_reference
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from omni_envs.demonstrations import Demonstration, SourceMotion, scale_demonstration
 from omni_envs.demonstrations.source_resampling import resample_source
-from omni_envs.errors import InvalidDataError
+from omni_envs.errors import InvalidDataError, InvalidOptionError
 from omni_envs.metrics import evaluate
 from omni_envs.references.build import STANCE
 from omni_envs.references.formats import ForeignMotion, load_motion
@@ -21,44 +21,69 @@ from omni_envs.scenes import Scene
 
 
 def open_reference(
-    path: str | Path, robot: str | Robot = "g1", demonstration: Demonstration | None = None
+    path: str | Path,
+    robot: str | Robot = "g1",
+    demonstration: Demonstration | None = None,
+    *,
+    scene: Scene | None = None,
+    fps: float | None = None,
 ) -> Reference:
     """Opens a reference of ours, or completes a robot motion of another project to one.
 
     Args:
         path: A file that ``Reference.save`` wrote, or any that ``load_motion`` reads.
         robot: The robot of a foreign motion.
-        demonstration: What a foreign motion was made from.
+        demonstration: What a foreign motion was made from; a reference brings its own.
+        scene: Object and terrain of a foreign motion, at robot scale, where no demonstration brings
+            them.
+        fps: Frames per second of a foreign motion whose file does not tell.
 
     Raises:
         FileFormatError: The file is neither, or damaged.
-        InvalidDataError: The foreign motion does not fit robot or demonstration.
+        InvalidDataError: The foreign motion does not fit robot, demonstration or scene.
+        InvalidOptionError: Something was given that the file brings itself.
     """
-    if "format" in read_npz(path, checked=False):
+    path = Path(path)
+    if path.suffix != ".csv" and "format" in read_npz(path, checked=False):
+        for name, value in (("scene", scene), ("fps", fps)):
+            if value is not None:
+                raise InvalidOptionError(f"{name}: the reference {path} brings its own.")
         return Reference.load(path)
-    return reference_from_motion(load_motion(path, robot), demonstration)
+    return reference_from_motion(load_motion(path, robot, fps=fps), demonstration, scene)
 
 
 def reference_from_motion(
-    motion: ForeignMotion, demonstration: Demonstration | None = None
+    motion: ForeignMotion,
+    demonstration: Demonstration | None = None,
+    scene: Scene | None = None,
 ) -> Reference:
     """Completes a foreign motion to a reference: velocities from its poses, scene, source, report.
 
     Args:
         motion: What ``load_motion`` read.
         demonstration: What the motion was made from. It brings scene, stance and contacts; without
-            it the motion stands on flat ground and its report has no figure that needs a source.
+            it the report has no figure that needs a source.
+        scene: Object and terrain at robot scale; without demonstration and scene the motion stands
+            on flat ground.
 
     Raises:
-        InvalidDataError: The motion has an object and no demonstration tells which, or their
-            lengths differ by more than the frame that some converters drop.
+        InvalidDataError: The motion has an object and nothing tells which, or the reverse, or the
+            lengths of motion and demonstration differ by more than the frame that some converters
+            drop.
+        InvalidOptionError: Demonstration and scene are both given.
     """
     robot, frames = motion.robot, len(motion.qpos)
     owner = f"Motion {motion.path.name}"
+    if demonstration is not None and scene is not None:
+        raise InvalidOptionError("scene: the demonstration brings it; give one of the two.")
     if demonstration is None:
-        if motion.object_poses is not None:
-            raise InvalidDataError(owner, "demonstration", "given: it has an object", "None")
-        source, scene, stance, contacts = None, Scene(), None, None
+        scene = scene or Scene()
+        if (motion.object_poses is None) != (scene.object is None):
+            expected, found = ("an object", "none") if scene.object is None else ("none", "one")
+            raise InvalidDataError(
+                owner, "scene (or demonstration)", f"one with {expected}, as the motion", found
+            )
+        source, stance, contacts = None, None, None
     else:
         source = resample_source(scale_demonstration(demonstration, robot.height), motion.fps)
         if abs(source.num_frames - frames) > 1:

@@ -7,7 +7,8 @@ import os
 import uuid
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -41,23 +42,33 @@ def write_npz(path: str | Path, arrays: Mapping[str, np.ndarray]) -> Path:
     Raises:
         InvalidDataError: An array of Python objects.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     plain = {name: np.asarray(array) for name, array in arrays.items()}
     for name, array in plain.items():
         if array.dtype.hasobject:
             raise InvalidDataError(str(path), name, "numbers, flags or text", "Python objects")
     plain[DIGEST] = np.array(digest(plain))
+    with complete_file(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, allow_pickle=False, **plain)
+    return Path(path)
+
+
+@contextmanager
+def complete_file(path: str | Path) -> Iterator[Path]:
+    """Gives a temporary file to write; at the end it takes the place of ``path``, or is gone.
+
+    Args:
+        path: The file that is there only when complete; its folder is made where needed.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.{uuid.uuid4().hex}.tmp")
     try:
-        with open(temporary, "xb") as file:
-            np.savez_compressed(file, allow_pickle=False, **plain)
-            file.flush()
+        yield temporary
+        with temporary.open("rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
-    return path
 
 
 def read_npz(path: str | Path, *, checked: bool = True) -> dict[str, np.ndarray]:

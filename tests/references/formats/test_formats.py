@@ -9,7 +9,7 @@ from omni_envs.references import reference_from_qpos
 from omni_envs.references.formats import load_motion
 from omni_envs.robots import G1
 
-SHARED = Path(os.environ.get("OMNI_ENVS_SHARED", Path(__file__).parents[3] / "shared"))
+SHARED = Path(os.environ.get("OMNI_ENVS_SHARED", Path(__file__).parents[4] / "shared"))
 
 
 @pytest.fixture
