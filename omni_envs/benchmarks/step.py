@@ -182,7 +182,7 @@ def _aim(vector: OmniVectorEnv, observations: Any, rng: np.random.Generator) -> 
     joints = vector.robot.num_joints
     seen = observations["policy"] if isinstance(observations, dict) else observations
     noise = NOISE * rng.standard_normal((len(seen), joints))
-    if vector.config.action.mode == "residual":
+    if vector.config.action.mode != "default":
         return noise
     # The command comes first: joint positions, then velocities.
     offset = seen[:, :joints] - vector.robot.default_joint_array

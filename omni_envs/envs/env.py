@@ -26,7 +26,8 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
 
     **Action**: ``Box(-10, 10, (n,))``. The target of joint j is default_j + scale_j · a_j with
     scale = 0.25 · effort / kp, held for a control step of 0.02 s; with ``action={"mode":
-    "residual"}`` the reference's joint position takes the place of the default.
+    "residual"}`` the reference's joint position takes the place of the default, with
+    ``"feedforward"`` a position ahead of it that makes up for damping and load.
 
     **Observation**: ``Box(-inf, inf, (160,))``; without state estimation the terms
     ``motion_anchor_pos_b`` and ``base_lin_vel`` are absent, 154 entries. "_b" is the frame of the

@@ -40,6 +40,7 @@ from omni_envs.tracking.config import (
     TerminationConfig,
     make_config,
 )
+from omni_envs.tracking.feedforward import action_targets
 from omni_envs.tracking.motion import Frames, MotionLibrary
 from omni_envs.tracking.motion_sampling import MotionSampler
 from omni_envs.tracking.randomization import push, start_state
@@ -72,6 +73,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         critic_layout: Names and slices of the privileged observation.
         simulation: The physics.
         sampler: Where episodes start.
+        action_targets: (T, n) per reference, the joint positions (rad) that actions count from, or
+            None where that is the default pose.
         divergences: The latest diverged simulations, for replay.
 
     Args:
@@ -158,7 +161,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             )
         self.render_mode = render_mode
         self.references = resolve_references(reference, self.robot, task)
-        self._library = MotionLibrary(self.robot, self.references, 1 / dt)
+        mode = config.action.mode
+        self.action_targets = (
+            None if mode == "default" else action_targets(self.robot, self.references, mode)
+        )
+        self._library = MotionLibrary(self.robot, self.references, 1 / dt, self.action_targets)
         self.scenes, self._scene_of = distinct_scenes(self.references)
         self._pictures = Pictures(self.robot, self.scenes, width, height)
         self._task = TrackingTask(self.robot, config, self._library.has_object)
@@ -256,10 +263,10 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             raise InvalidOptionError("step: call reset first.")
         episodes, frames = self._episodes, self._frames
         action, bad = self._checked(actions)
-        if self.config.action.mode == "residual":
+        if frames.target is not None:
             # From here on the standard action of the same joint target: rewards and the observed
-            # previous action then mean the same in both modes, and for an exported policy.
-            action += (frames.qpos[:, 7:] - self.robot.default_joint_array) / self._scale
+            # previous action then mean the same in all modes, and for an exported policy.
+            action += (frames.target - self.robot.default_joint_array) / self._scale
         np.copyto(self.simulation.ctrl, episodes.default + self._scale * action)
         diverged = self.simulation.step() | bad
         bodies = self.simulation.bodies()

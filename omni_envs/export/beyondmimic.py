@@ -5,9 +5,9 @@ Inputs ``obs`` [1, ·] and ``time_step`` [1, 1], outputs ``actions`` and the mot
 motion_tracking_controller, mjlab and whatever follows BeyondMimic's convention.
 
 A residual policy is folded into the standard action, so that ``default + scale · actions`` is its
-joint target: actions = a + (reference - default) / scale. The reference comes from the observation,
-the very numbers that the network saw. The observed previous action is the standard action in both
-modes, in training too.
+joint target: actions = a + (reference + lead - default) / scale. The reference comes from the
+observation, the very numbers that the network saw; the lead of a feedforward policy is a table over
+the frames. The observed previous action is the standard action in all modes, in training too.
 """
 
 from __future__ import annotations
@@ -56,6 +56,7 @@ class BeyondMimicGraph(nn.Module):
     """
 
     default: Tensor
+    lead: Tensor
     scale: Tensor
     body_pos_w: Tensor
 
@@ -68,7 +69,7 @@ class BeyondMimicGraph(nn.Module):
             shape = tuple(actor(torch.zeros(1, self.size)).shape)
         if shape != (1, n):
             raise InvalidDataError("Policy", "action", f"(1, {n}) for {robot.title}", f"{shape}")
-        self.residual = description.is_residual
+        self.residual = description.targets is not None
         if self.residual and COMMAND not in description.layout.names:
             raise InvalidDataError(
                 "Residual policy",
@@ -80,7 +81,12 @@ class BeyondMimicGraph(nn.Module):
         self.command = slice(start, start + n)
         self.last_frame = reference.num_frames - 1
         tracked = reference.body_indices(robot.tracked_bodies)
+        lead = 0.0
+        if description.targets is not None:
+            lead = description.targets - reference.joint_positions
+        self.leads = bool(np.any(lead))
         for name, array in {
+            "lead": lead,
             "default": robot.default_joint_array,
             "scale": description.action_scale,
             "joint_pos": reference.joint_positions,
@@ -97,7 +103,10 @@ class BeyondMimicGraph(nn.Module):
         frame = time_step.to(torch.int64).squeeze(-1).clamp(0, self.last_frame)
         actions = self.actor(obs)
         if self.residual:
-            actions = actions + (obs[:, self.command] - self.default) / self.scale
+            target = obs[:, self.command]
+            if self.leads:
+                target = target + self.lead[frame]
+            actions = actions + (target - self.default) / self.scale
         return actions, *(getattr(self, name)[frame] for name in OUTPUTS[1:])
 
 

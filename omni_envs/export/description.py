@@ -27,12 +27,15 @@ class PolicyDescription:
         reference: The motion that it tracks.
         layout: Terms of its observation.
         config: The task that it was trained on.
+        targets: (T, n) joint positions that the network's actions count from, rad, or None where
+            that is the default pose.
     """
 
     robot: Robot
     reference: Reference
     layout: ObservationLayout
     config: TrackingConfig
+    targets: np.ndarray | None
 
     @property
     def action_scale(self) -> np.ndarray:
@@ -44,11 +47,6 @@ class PolicyDescription:
         """Body that anchors the comparison with the reference."""
         torso = self.config.anchor == "torso"
         return self.robot.torso_body if torso else self.robot.anchor_body
-
-    @property
-    def is_residual(self) -> bool:
-        """Whether the network's action is an offset from the reference instead of the default."""
-        return self.config.action.mode == "residual"
 
     def metadata(self, run_path: str) -> dict[str, str]:
         """Returns the metadata of the ``beyondmimic`` profile: comma-separated, all digits.
@@ -126,7 +124,10 @@ def describe(env: Any) -> PolicyDescription:
         raise InvalidOptionError(
             f"A policy file holds one motion; the environment has {len(base.references)}."
         )
-    return PolicyDescription(base.robot, base.references[0], base.policy_layout, base.config)
+    targets = None if base.action_targets is None else base.action_targets[0]
+    return PolicyDescription(
+        base.robot, base.references[0], base.policy_layout, base.config, targets
+    )
 
 
 def _csv(values: Sequence[float] | np.ndarray) -> str:

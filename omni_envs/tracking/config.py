@@ -262,14 +262,16 @@ class ActionConfig:
     """What an action means: joint target = offset + scale · a, scale = 0.25 · effort / kp.
 
     Attributes:
-        mode: The offset: ``"default"`` pose, or ``"residual"``: the reference's joint positions.
+        mode: The offset: ``"default"`` pose, ``"residual"``: the reference's joint positions, or
+            ``"feedforward"``: positions ahead of those by what damping and load will hold the joint
+            back (see ``omni_envs.tracking.feedforward``), so that the policy only has to balance.
             Only what is passed to ``step`` differs: rewards and the observed previous action are
-            about the action that gives the same target from the default pose, in both modes.
+            about the action that gives the same target from the default pose, in all modes.
         limit: Actions are clipped to ± this.
         scale: Factor on the scale of the robot.
     """
 
-    mode: Literal["default", "residual"] = "default"
+    mode: Literal["default", "residual", "feedforward"] = "default"
     limit: float = 10.0
     scale: float = 1.0
 

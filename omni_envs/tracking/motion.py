@@ -25,6 +25,7 @@ class Frames(NamedTuple):
         bodies: The tracked bodies.
         object_pose: (N, 7), or None.
         object_velocity: (N, 6) world linear, world angular, or None.
+        target: (N, n) joint positions that residual actions count from, rad, or None.
     """
 
     qpos: np.ndarray
@@ -32,6 +33,7 @@ class Frames(NamedTuple):
     bodies: Bodies
     object_pose: np.ndarray | None
     object_velocity: np.ndarray | None
+    target: np.ndarray | None = None
 
 
 class MotionLibrary:
@@ -46,13 +48,20 @@ class MotionLibrary:
         robot: The robot.
         references: Its references, all with an object or all without.
         fps: Frame rate that they must have: the control rate.
+        targets: (T, n) per reference, what residual actions count from, or None.
 
     Raises:
         InvalidDataError: A reference is of another robot, too short, at another rate, or without
             the object that the others have.
     """
 
-    def __init__(self, robot: Robot, references: Sequence[Reference], fps: float) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        references: Sequence[Reference],
+        fps: float,
+        targets: Sequence[np.ndarray] | None = None,
+    ) -> None:
         if not references:
             raise InvalidDataError("Environment", "reference", "at least one reference", "none")
         self.has_object = references[0].object_poses is not None
@@ -72,6 +81,7 @@ class MotionLibrary:
         self.lengths = np.array([r.num_frames for r in references])
         self.starts = np.concatenate([[0], np.cumsum(self.lengths)[:-1]])
         self._table = np.concatenate([self._rows(robot, r) for r in references])
+        self._targets = None if targets is None else np.concatenate(targets)
 
     @property
     def num_motions(self) -> int:
@@ -85,7 +95,10 @@ class MotionLibrary:
 
     def frames(self, index: np.ndarray) -> Frames:
         """Returns the table's frames at (N,) indices, as fresh arrays."""
-        return self._split(np.take(self._table, index, axis=0))
+        frames = self._split(np.take(self._table, index, axis=0))
+        if self._targets is None:
+            return frames
+        return frames._replace(target=np.take(self._targets, index, axis=0))
 
     def places(
         self, motion: int | np.ndarray | None, frame: int | np.ndarray | None, count: int

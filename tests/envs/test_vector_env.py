@@ -4,6 +4,7 @@ from gymnasium.vector import AutoresetMode
 
 from omni_envs.envs import OmniVectorEnv
 from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
+from omni_envs.tracking.feedforward import feedforward_lead
 
 ACTIONS = np.random.default_rng(0).normal(size=(40, 4, 29)) * 0.5
 
@@ -213,6 +214,26 @@ def test_residual_actions_are_about_the_reference(make, quiet, reference):
     env.step(np.full((1, 29), 0.5))
     expected = reference.joint_positions[21] + 0.5 * env.robot.action_scale
     np.testing.assert_allclose(env.simulation.ctrl[0], expected, atol=1e-12)
+
+
+def test_feedforward_actions_are_about_targets_ahead_of_the_reference(make, quiet, reference):
+    env = make(1, **quiet, action={"mode": "feedforward"})
+    env.reset(seed=0, options={"frame": 20})
+    env.step(np.full((1, 29), 0.5))
+    target = reference.joint_positions[21] + feedforward_lead(env.robot, reference)[21]
+    np.testing.assert_allclose(
+        env.simulation.ctrl[0], target + 0.5 * env.robot.action_scale, atol=1e-12
+    )
+    standard = make(1, **quiet, action={"limit": 1e3})
+    action = (env.simulation.ctrl - env.robot.default_joint_array) / env.robot.action_scale
+    standard.reset(seed=0, options={"frame": 20})
+    seen, reward, *_ = standard.step(action)
+    env.reset(seed=0, options={"frame": 20})
+    seen_again, reward_again, *_ = env.step(np.full((1, 29), 0.5))
+    np.testing.assert_allclose(
+        seen_again, seen, atol=1e-6
+    )  # the previous action is the standard one
+    np.testing.assert_allclose(reward_again, reward, atol=1e-12)
 
 
 def test_default_actions_are_about_the_default_pose(make, quiet):

@@ -16,6 +16,7 @@ from omni_envs.export.description import PolicyDescription
 from omni_envs.export.parity import parity
 from omni_envs.robots import G1
 from omni_envs.tracking import make_config
+from omni_envs.tracking.feedforward import action_targets
 from omni_envs.tracking.observations import policy_layout
 from omni_envs.training.normalizer import RunningNormalizer
 from omni_envs.training.onnx_policy import OnnxPolicy
@@ -25,7 +26,10 @@ RNG = np.random.default_rng(0)
 
 def _description(motion, **options) -> PolicyDescription:
     config = make_config(**options)
-    return PolicyDescription(G1, motion, policy_layout(config.observation, 29), config)
+    mode = config.action.mode
+    targets = None if mode == "default" else action_targets(G1, [motion], mode)[0]
+    layout = policy_layout(config.observation, 29)
+    return PolicyDescription(G1, motion, layout, config, targets)
 
 
 def _actor(size: int, outputs: int = 29) -> torch.nn.Module:
@@ -44,7 +48,7 @@ def _export(motion, tmp_path, **options):
     return description, graph, OnnxPolicy(path)
 
 
-@pytest.mark.parametrize("mode", ["default", "residual"])
+@pytest.mark.parametrize("mode", ["default", "residual", "feedforward"])
 @pytest.mark.parametrize("state_estimation", [True, False])
 def test_file_computes_what_the_network_computes(motion, tmp_path, mode, state_estimation):
     options = {
@@ -75,8 +79,9 @@ def test_motion_is_embedded_and_stays_at_its_last_frame(motion, tmp_path):
             np.testing.assert_allclose(out[name][0], array[row], atol=1e-6)
 
 
-def test_residual_actions_are_folded_into_standard_ones(motion, tmp_path):
-    description, graph, file = _export(motion, tmp_path, action={"mode": "residual", "scale": 0.5})
+@pytest.mark.parametrize("mode", ["residual", "feedforward"])
+def test_residual_actions_are_folded_into_standard_ones(motion, tmp_path, mode):
+    description, graph, file = _export(motion, tmp_path, action={"mode": mode, "scale": 0.5})
     observation = RNG.normal(size=160).astype(np.float32)
     command = motion.joint_positions[7]
     observation[:29] = command
@@ -84,7 +89,10 @@ def test_residual_actions_are_folded_into_standard_ones(motion, tmp_path):
         residual = graph.actor(torch.from_numpy(observation)[None]).numpy()[0]
     standard = file.run(observation, 7)["actions"][0]
     target = G1.default_joint_array + description.action_scale * standard
-    np.testing.assert_allclose(target, command + description.action_scale * residual, atol=1e-6)
+    expected = description.targets[7] + description.action_scale * residual
+    np.testing.assert_allclose(target, expected, atol=1e-5)
+    ahead = np.abs(description.targets[7] - command).max()
+    assert ahead == 0 if mode == "residual" else ahead > 0.05
     np.testing.assert_allclose(description.action_scale, 0.5 * G1.action_scale)
 
 
