@@ -5,6 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, RowLimit, Rows
 
@@ -29,9 +30,8 @@ class ContactLimit(RowLimit):
         if data.ncon == 0:
             return None
         contact = data.contact
-        bodies = model.geom_bodyid[contact.geom]
+        bodies, own, lower = kernels.contact_sides(
+            contact.geom, model.geom_bodyid, contact.dist, configuration.ancestors, self._tolerance
+        )
         A = configuration.contact_rows(bodies, contact.pos, contact.frame[:, :3])
-        # Every degree of freedom of the root moves every body of the robot, and nothing else.
-        own = configuration.ancestors[bodies][:, :, 0].all(axis=1)
-        lower = -contact.dist - np.where(own, 0.0, self._tolerance)
         return Rows(A, lower, np.full(len(lower), np.inf), np.where(own, SELF, CONTACT))

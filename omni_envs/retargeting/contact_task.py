@@ -7,6 +7,7 @@ import numpy as np
 
 from omni_envs import rotations
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.tasks import CostTask, Quadratic
 
@@ -57,10 +58,7 @@ class ContactTask(CostTask):
             bodies, np.array([point for _, point, _ in nearest])
         )
         J = np.moveaxis(jacobian, 0, 1).reshape(gaps.size, -1)
-        gap = gaps.ravel()
-        weights = self._weight * self._ramp
-        weighted = weights[:, None] * J
-        return Quadratic(J.T @ weighted, -(gap @ weighted), 0.5 * float(weights @ (gap * gap)))
+        return Quadratic(*kernels.weighted_squares(J, -gaps.ravel(), self._weight * self._ramp))
 
 
 def _ramps(touching: np.ndarray) -> np.ndarray:
@@ -92,15 +90,12 @@ class _Link:
     ) -> tuple[int, np.ndarray, np.ndarray]:
         """Body and point of the link nearest to a place, and the gap from there, 0 inside."""
         data = configuration.data
-        rotation = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
-        local = ((place - data.geom_xpos[self._geoms])[:, None] @ rotation)[:, 0]
-        beyond = local - np.clip(local, -self._half, self._half)
-        distance = np.sqrt((beyond * beyond).sum(axis=1))
-        nearest = int(np.argmin(distance - self._radius))
-        length = max(distance[nearest], 1e-12)
+        nearest, away, length = kernels.nearest_box(
+            data.geom_xpos, data.geom_xmat, self._geoms, self._half, self._radius, place
+        )
         # Within the dead zone the place counts as touched.
         reach = self._radius[nearest] + _NEAR
-        gap = rotation[nearest] @ beyond[nearest] * max(0.0, 1.0 - reach / length)
+        gap = away * max(0.0, 1.0 - reach / max(length, 1e-12))
         return int(self._bodies[nearest]), place - gap, gap
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.stance_plan import StancePlan
 from omni_envs.retargeting.tasks import CostTask, Quadratic
@@ -23,21 +24,18 @@ class FootholdTask(CostTask):
     def set_frame(self, t: int) -> None:
         """Chooses a frame of the plan."""
         plan = self._plan
-        self._index = np.nonzero(plan.arm_weights[t])
-        self._weights = plan.arm_weights[t][self._index]
-        self._targets = plan.arms[t][self._index]
-        self._forward = plan.forward[t][self._index[0]]
+        foot, arm = np.nonzero(plan.arm_weights[t])
+        self._weights = plan.arm_weights[t][foot, arm]
+        self._targets = plan.arms[t][foot, arm]
+        # Components of ``Kinematics.feet`` that are wished for, as a matrix on all of them.
+        select = np.zeros((len(foot), 2, 3, 2))
+        select[np.arange(len(foot)), foot, arm + 1] = plan.forward[t][foot]
+        self._select = select.reshape(-1, 12)
 
     def quadratic(self, configuration: Kinematics) -> Quadratic | None:
         """Returns the Gauss-Newton model of the cost."""
         if not len(self._weights):
             return None
-        foot, arm = self._index
-        feet = configuration.feet()
-        arms = feet[foot, arm + 1, :2]
-        residual = (arms * self._forward).sum(axis=1) - self._targets
-        jacobian = configuration.feet_jacobians()[foot, arm + 1]
-        J = (jacobian * self._forward[:, :, None]).sum(axis=1)
-        weighted = J * self._weights[:, None]
-        value = 0.5 * float(self._weights @ np.square(residual))
-        return Quadratic(J.T @ weighted, residual @ weighted, value)
+        arms = self._select @ configuration.feet()[:, :, :2].ravel()
+        J = self._select @ configuration.feet_jacobians().reshape(12, -1)
+        return Quadratic(*kernels.weighted_squares(J, arms - self._targets, self._weights))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
 from omni_envs.retargeting.options import RetargetOptions
@@ -13,7 +14,7 @@ from omni_envs.retargeting.qp import StepQP, step_bounds, step_model, step_rows
 from omni_envs.retargeting.solver import StepSolver
 from omni_envs.retargeting.tasks import CostTask
 
-_KINDS = (STANCE, SELF, CONTACT)
+_KINDS = (STANCE, SELF, CONTACT)  # as they are numbered
 _DEEP = 5e-3  # m
 
 
@@ -132,6 +133,5 @@ class FrameSolver:
 
 def _violations(rows: Rows) -> tuple[float, float, float]:
     """Largest violation at dq = 0 by kind."""
-    excess = np.maximum(rows.lower, -rows.upper)
-    stance, own, contact = (float(excess[rows.kind == k].max(initial=0.0)) for k in _KINDS)
+    stance, own, contact = kernels.worst_violations(*rows[1:], kinds=len(_KINDS)).tolist()
     return stance, own, contact

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.tasks import CostTask, Quadratic
@@ -17,12 +18,15 @@ class InteractionMeshTask(CostTask):
 
     def __init__(self, mesh: InteractionMesh, weight: float) -> None:
         self._mesh, self._weight = mesh, weight
+        self._moments = np.swapaxes(mesh.factor, 1, 2) @ mesh.factor
+        self._moments *= weight
         self.set_frame(0)
 
     def set_frame(self, t: int) -> None:
         """Chooses the source frame."""
         self._factor, self._offset = self._mesh.factor[t], self._mesh.offset[t]
         self._constant = float(self._mesh.constant[t])
+        self._moment = self._moments[t]
 
     def energy(self, configuration: Kinematics) -> float:
         """Deformation energy, weight 1, m²."""
@@ -31,10 +35,8 @@ class InteractionMeshTask(CostTask):
 
     def quadratic(self, configuration: Kinematics) -> Quadratic:
         """Returns the Gauss-Newton model of the cost."""
-        points = configuration.keypoints()
-        residual = (self._factor @ points + self._offset).T.ravel()
-        jacobian = self._factor @ configuration.keypoint_jacobians()
-        jacobian = jacobian.reshape(len(residual), -1)
-        weighted = self._weight * jacobian
-        energy = float(residual @ residual) + self._constant
-        return Quadratic(jacobian.T @ weighted, residual @ weighted, 0.5 * self._weight * energy)
+        residual = self._factor @ configuration.keypoints() + self._offset
+        force = self._weight * (self._factor.T @ residual)
+        H, g = kernels.coupled_squares(configuration.keypoint_jacobians(), self._moment, force)
+        value = 0.5 * self._weight * (float(np.vdot(residual, residual)) + self._constant)
+        return Quadratic(H, g, value)

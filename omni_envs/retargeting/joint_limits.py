@@ -15,13 +15,15 @@ class JointLimit(BoundLimit):
     """q_min ≤ q ≤ q_max, at full gain (mink's own limit closes the gap by 95 % per step)."""
 
     def __init__(self, robot: Robot) -> None:
-        self._lower, self._upper = robot.reference_joint_ranges.T.copy()
+        base = np.full((6, 2), [-np.inf, np.inf])
+        self._lower, self._upper = np.concatenate([base, robot.reference_joint_ranges]).T.copy()
 
     def bounds(self, configuration: Kinematics) -> tuple[np.ndarray, np.ndarray]:
         """Returns the way to either limit."""
+        lower, upper = self._lower.copy(), self._upper.copy()
         joints = configuration.data.qpos[7:]
-        lower, upper = np.full(6 + len(joints), -np.inf), np.full(6 + len(joints), np.inf)
-        lower[6:], upper[6:] = self._lower - joints, self._upper - joints
+        lower[6:] -= joints
+        upper[6:] -= joints
         return lower, upper
 
 
@@ -33,8 +35,8 @@ class StepVelocityLimit(BoundLimit):
 
     def __init__(self, robot: Robot, fps: float, fraction: float) -> None:
         # A hair inside, so that a velocity computed from rounded positions satisfies the limit.
-        self._step = robot.velocity_limits * (fraction / fps) * (1.0 - 1e-6)
-        self._base = np.repeat([_BASE_SPEED, _BASE_TURN], 3) / fps
+        joints = robot.velocity_limits * fraction * (1.0 - 1e-6)
+        self._step = np.concatenate([[_BASE_SPEED] * 3, [_BASE_TURN] * 3, joints]) / fps
         self._previous: np.ndarray | None = None
 
     def set_previous(self, q: np.ndarray | None) -> None:
@@ -43,9 +45,8 @@ class StepVelocityLimit(BoundLimit):
 
     def bounds(self, configuration: Kinematics) -> tuple[np.ndarray, np.ndarray]:
         """Returns what is left of the step since the previous frame."""
-        nv = configuration.model.nv
         if self._previous is None:
-            return np.full(nv, -np.inf), np.full(nv, np.inf)
+            unbounded = np.full(configuration.model.nv, np.inf)
+            return -unbounded, unbounded
         back = configuration.difference(self._previous)
-        step = np.concatenate([self._base, self._step])
-        return back - step, back + step
+        return back - self._step, back + self._step

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omni_envs.retargeting import kernels
 from omni_envs.robots import KEYPOINTS, SIDES, Foot, Robot
 from omni_envs.robots.self_collision import resting_pairs
 from omni_envs.scenes import OBJECT, Scene, build_spec
@@ -101,8 +102,8 @@ class Kinematics(mink.Configuration):
 
     def positions(self, points: Points) -> np.ndarray:
         """(K, 3) world positions of points."""
-        rotation = self.data.xmat[points.bodies].reshape(-1, 3, 3)
-        return self.data.xpos[points.bodies] + (rotation @ points.offsets[:, :, None])[:, :, 0]
+        data = self.data
+        return kernels.positions(data.xpos, data.xmat, points.bodies, points.offsets)
 
     def jacobians(self, points: Points, positions: np.ndarray) -> np.ndarray:
         """(3, K, nv) Jacobians of points at (K, 3) world positions."""
@@ -113,17 +114,10 @@ class Kinematics(mink.Configuration):
 
         J = mask ⊙ (linear + angular × (p - com)), from the spatial axes of all degrees of freedom.
         """
-        cdof = self.data.cdof
-        arm = positions - self.data.subtree_com[self._root]
-        x, y, z = arm[:, 0:1], arm[:, 1:2], arm[:, 2:3]
-        wx, wy, wz = cdof[:, 0], cdof[:, 1], cdof[:, 2]
-        jacobian = np.empty((3, len(arm), len(cdof)))
-        np.subtract(wy * z, wz * y, out=jacobian[0])
-        np.subtract(wz * x, wx * z, out=jacobian[1])
-        np.subtract(wx * y, wy * x, out=jacobian[2])
-        jacobian += cdof[:, 3:].T[:, None, :]
-        jacobian *= self.ancestors[bodies]
-        return jacobian
+        data = self.data
+        return kernels.jacobians(
+            data.cdof, data.subtree_com[self._root], self.ancestors, bodies, positions
+        )
 
     def keypoints(self) -> np.ndarray:
         """(15, 3) world keypoints."""
@@ -171,22 +165,10 @@ class Kinematics(mink.Configuration):
             points: Where they touch.
             normals: From the first to the second body.
         """
-        mask = self.ancestors[bodies]
-        rows = self.wrench_rows(points, normals)
-        rows *= mask[:, 1] - mask[:, 0]
-        return rows
-
-    def wrench_rows(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N, nv) rows n·J(p) of (N, 3) points and directions, before the mask of a body."""
-        arm = points - self.data.subtree_com[self._root]
-        wrench = np.empty((len(arm), 6))
-        ax, ay, az = arm.T
-        nx, ny, nz = normals.T
-        wrench[:, 0] = ay * nz - az * ny
-        wrench[:, 1] = az * nx - ax * nz
-        wrench[:, 2] = ax * ny - ay * nx
-        wrench[:, 3:] = normals
-        return wrench @ self.data.cdof.T
+        data = self.data
+        return kernels.contact_rows(
+            data.cdof, data.subtree_com[self._root], self.ancestors, bodies, points, normals
+        )
 
 
 def _foot_points(foot: Foot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -61,7 +61,7 @@ def step_bounds(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Intersection of all bounds; where rounding leaves it empty, its middle."""
     lower = np.full(configuration.model.nv, -np.inf)
-    upper = np.full(configuration.model.nv, np.inf)
+    upper = -lower
     for limit in limits:
         low, high = limit.bounds(configuration)
         np.maximum(lower, low, out=lower)
@@ -84,15 +84,17 @@ def step_model(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """H, g and value of the sum of all tasks."""
     nv = configuration.model.nv
-    H, g, value = _RIDGE * np.eye(nv), np.zeros(nv), 0.0
+    H, g, value = np.zeros((nv, nv)), np.zeros(nv), 0.0
+    diagonal = np.full(nv, _RIDGE)
     for task in tasks:
         model = task.quadratic(configuration)
         if model is None:
             continue
         if model.H.ndim == 1:
-            H.flat[:: nv + 1] += model.H
+            diagonal += model.H
         else:
             H += model.H
         g += model.g
         value += model.value
+    H.flat[:: nv + 1] += diagonal
     return H, g, value

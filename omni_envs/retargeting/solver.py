@@ -91,8 +91,6 @@ def _program(qp: StepQP, damping: float) -> tuple[np.ndarray, ...]:
         H.flat[:: len(H) + 1] += damping * qp.metric
     upper = np.concatenate([qp.upper, qp.rows.upper])
     lower = np.concatenate([qp.lower, qp.rows.lower])
-    np.minimum(upper, 1e30, out=upper)  # DAQP's infinity
-    np.maximum(lower, -1e30, out=lower)
     return H, qp.g, np.ascontiguousarray(qp.rows.A), upper, lower
 
 

@@ -11,6 +11,7 @@ from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE, StancePlan
 
 TIP, HEART, LEFT = 0, 1, 2
 """Rows of ``Kinematics.feet``: the toe tip, and the arms from there to heart and left."""
+_AXES = np.eye(2)
 
 
 class StanceLimit(RowLimit):
@@ -33,33 +34,56 @@ class StanceLimit(RowLimit):
     def hold(self, t: int) -> None:
         """Chooses frame t of the plan. ``record`` must have been called on frame t - 1."""
         plan, stays = self._plan, self._stays(t)
-        slack = plan.tip_slack[t][:, None]
-        centre = np.where(stays[:, None], self._tips, plan.tips[t])
-        low, high = centre - slack, centre + slack
-        if t > 0:
-            # Nowhere further than a step from the frame before, even if that misses the foothold.
-            step = np.where(stays, np.inf, plan.tip_step[t])[:, None]
-            np.clip(low, self._tips - step, self._tips + step, out=low)
-            np.clip(high, self._tips - step, self._tips + step, out=high)
-        held = np.isfinite(plan.tip_slack[t]) | (plan.tier[t] == LOOSE)
-        self._held = np.flatnonzero(held & np.isfinite(low[:, 0]))
-        self._low, self._high = low[self._held], high[self._held]
-        turns, rolls = plan.turns[t], plan.rolls[t]
-        self._flat = np.flatnonzero(stays & ~turns & ~rolls)
-        self._rolling = np.flatnonzero(stays & ~turns & rolls)
+        self._windows: list[tuple[np.ndarray, float, float]] = []
+        tolerance = self._options.heart_tolerance
+        for foot in range(2):
+            slack, tip = plan.tip_slack[t, foot], self._tips[foot]
+            centre = tip if stays[foot] else plan.tips[t, foot]
+            low, high = centre - slack, centre + slack
+            if t > 0 and not stays[foot]:
+                # Nowhere further than a step from the frame before, even if that misses the
+                # foothold.
+                step = plan.tip_step[t, foot]
+                low = np.minimum(np.maximum(low, tip - step), tip + step)
+                high = np.minimum(np.maximum(high, tip - step), tip + step)
+            if np.isfinite(low[0]) and (np.isfinite(slack) or plan.tier[t, foot] == LOOSE):
+                for axis in range(2):
+                    self._hold(foot, TIP, _AXES[axis], low[axis], high[axis])
+            if not stays[foot] or plan.turns[t, foot]:
+                continue
+            if plan.rolls[t, foot]:
+                # The arm to the left keeps no component along the heading.
+                self._hold(foot, LEFT, self._forward[foot], -tolerance, tolerance)
+                continue
+            for axis in range(2):
+                arm = self._arms[foot, axis]
+                self._hold(foot, HEART, _AXES[axis], arm - tolerance, arm + tolerance)
+        if self._windows:
+            select, lower, upper = zip(*self._windows, strict=True)
+            self._select, self._lower, self._upper = map(np.array, (select, lower, upper))
+            self._kind = np.full(len(lower), STANCE)
+
+    def _hold(self, foot: int, point: int, direction: np.ndarray, low: float, high: float) -> None:
+        """Holds the component of a point of a foot along a direction within [low, high]."""
+        select = np.zeros((2, 3, 2))
+        select[foot, point] = direction
+        self._windows.append((select.ravel(), low, high))
 
     def record(self, configuration: Kinematics, t: int) -> None:
         """Remembers where frame t has put the feet, except those that it held in their place."""
-        plan, feet = self._plan, configuration.feet()[:, :, :2]
-        # A tip that has reached its foothold keeps that, so that its window does not wander.
-        missed = np.abs(feet[:, TIP] - plan.tips[t]).max(axis=1)
-        reached = (plan.tier[t] == ANCHORED) & (missed <= plan.tip_slack[t] + 1e-4)
-        moved = ~self._stays(t)
-        self._tips[moved] = np.where(reached[:, None], plan.tips[t], feet[:, TIP])[moved]
-        self._arms[moved] = feet[moved, HEART]
-        left = feet[moved, LEFT]
-        forward = left[:, ::-1] * [1.0, -1.0]
-        self._forward[moved] = forward / np.linalg.norm(left, axis=1, keepdims=True)
+        plan, feet, stays = self._plan, configuration.feet()[:, :, :2], self._stays(t)
+        for foot in range(2):
+            if stays[foot]:
+                continue
+            # A tip that has reached its foothold keeps that, so that its window does not wander.
+            tip, hold = feet[foot, TIP], plan.tips[t, foot]
+            reached = plan.tier[t, foot] == ANCHORED and (
+                np.abs(tip - hold).max() <= plan.tip_slack[t, foot] + 1e-4
+            )
+            self._tips[foot] = hold if reached else tip
+            self._arms[foot] = feet[foot, HEART]
+            x, y = feet[foot, LEFT]
+            self._forward[foot] = np.array([y, -x]) / np.hypot(x, y)
 
     def _stays(self, t: int) -> np.ndarray:
         """(2,) whether each foot keeps the place of the frame before."""
@@ -68,26 +92,8 @@ class StanceLimit(RowLimit):
 
     def rows(self, configuration: Kinematics) -> Rows | None:
         """Returns two rows for a held toe tip, two for a flat foot and one for a rolling one."""
-        if not len(self._held):
+        if not self._windows:
             return None
-        feet = configuration.feet()
-        jacobian = configuration.feet_jacobians()
-        nv = jacobian.shape[-1]
-        tips, arms = feet[self._held, TIP, :2], feet[self._flat, HEART, :2]
-        # The arm to the left keeps no component along the heading.
-        forward = self._forward[self._rolling]
-        turned = (feet[self._rolling, LEFT, :2] * forward).sum(axis=1)
-        A = np.concatenate(
-            [
-                jacobian[self._held, TIP].reshape(-1, nv),
-                jacobian[self._flat, HEART].reshape(-1, nv),
-                (jacobian[self._rolling, LEFT] * forward[:, :, None]).sum(axis=1),
-            ]
-        )
-        arm = (self._arms[self._flat] - arms).ravel()
-        centre = np.concatenate([np.zeros(tips.size), arm, -turned])
-        slack = np.full(len(centre), self._options.heart_tolerance)
-        lower, upper = centre - slack, centre + slack
-        lower[: tips.size] = (self._low - tips).ravel()
-        upper[: tips.size] = (self._high - tips).ravel()
-        return Rows(A, lower, upper, np.full(len(lower), STANCE))
+        places = self._select @ configuration.feet()[:, :, :2].ravel()
+        A = self._select @ configuration.feet_jacobians().reshape(12, -1)
+        return Rows(A, self._lower - places, self._upper - places, self._kind)

@@ -46,12 +46,14 @@ def test_feet_jacobians(configuration):
     np.testing.assert_allclose(configuration.feet_jacobians(), expected, atol=1e-7)
 
 
-def test_wrench_rows_are_jacobians_along_a_direction(configuration):
-    body = configuration.model.body("left_knee_link").id
+def test_contact_rows_are_relative_jacobians_along_the_normal(configuration):
+    bodies = np.array([configuration.model.body(f"left_{n}_link").id for n in ("knee", "elbow")])
     point, normal = np.array([[0.1, 0.2, 0.3]]), np.array([[0.0, 0.6, 0.8]])
-    jacobian = configuration.body_jacobians(np.array([body]), point)
-    row = configuration.wrench_rows(point, normal) * configuration.ancestors[body]
-    np.testing.assert_allclose(row[0], normal[0] @ jacobian[:, 0], atol=1e-12)
+    first, second = np.moveaxis(configuration.body_jacobians(bodies, point.repeat(2, axis=0)), 1, 0)
+    row = configuration.contact_rows(bodies[None], point, normal)
+    np.testing.assert_allclose(row[0], normal[0] @ (second - first), atol=1e-12)
+    from_world = configuration.contact_rows(np.array([[0, bodies[1]]]), point, normal)
+    np.testing.assert_allclose(from_world[0], normal[0] @ second, atol=1e-12)
 
 
 def test_heart_of_the_sole_is_behind_the_tip_and_left_is_left(configuration):

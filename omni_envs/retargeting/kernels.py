@@ -1,0 +1,205 @@
+"""The inner loops of a step, compiled: what is asked for once per quadratic program.
+
+Numba compiles them on first use and keeps the result in its cache next to this file, or in the
+user's cache directory where that cannot be written. Pure functions of arrays; no fast mathematics,
+so that the same input gives the same bits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+Array = np.ndarray
+_compiled = njit(cache=True, nogil=True)
+
+
+@_compiled
+def positions(xpos: Array, xmat: Array, bodies: Array, offsets: Array) -> Array:
+    """(K, 3) world positions of (K, 3) offsets in the frames of (K,) bodies."""
+    out = np.empty((len(bodies), 3))
+    for k in range(len(bodies)):
+        b = bodies[k]
+        x, y, z = offsets[k, 0], offsets[k, 1], offsets[k, 2]
+        for i in range(3):
+            R = xmat[b, 3 * i : 3 * i + 3]
+            out[k, i] = xpos[b, i] + R[0] * x + R[1] * y + R[2] * z
+    return out
+
+
+@_compiled
+def jacobians(cdof: Array, centre: Array, moves: Array, bodies: Array, points: Array) -> Array:
+    """(3, K, nv) Jacobians of (K, 3) world points of (K,) bodies.
+
+    J = linear + angular × (p - centre) for the degrees of freedom that move the body.
+
+    Args:
+        cdof: (nv, 6) spatial axes, angular part first.
+        centre: (3,) where they are taken.
+        moves: (nbody, nv) 1 where a degree of freedom moves a body.
+        bodies: (K,).
+        points: (K, 3).
+    """
+    count, nv = len(bodies), len(cdof)
+    out = np.empty((3, count, nv))
+    for k in range(count):
+        x, y, z = points[k, 0] - centre[0], points[k, 1] - centre[1], points[k, 2] - centre[2]
+        mask = moves[bodies[k]]
+        for v in range(nv):
+            if mask[v] == 0.0:
+                out[0, k, v] = out[1, k, v] = out[2, k, v] = 0.0
+                continue
+            wx, wy, wz = cdof[v, 0], cdof[v, 1], cdof[v, 2]
+            out[0, k, v] = cdof[v, 3] + wy * z - wz * y
+            out[1, k, v] = cdof[v, 4] + wz * x - wx * z
+            out[2, k, v] = cdof[v, 5] + wx * y - wy * x
+    return out
+
+
+@_compiled
+def contact_rows(
+    cdof: Array, centre: Array, moves: Array, bodies: Array, points: Array, normals: Array
+) -> Array:
+    """(N, nv) rows n·(J₂ - J₁) at (N, 3) points between (N, 2) bodies; see ``jacobians``."""
+    count, nv = len(bodies), len(cdof)
+    out = np.empty((count, nv))
+    for i in range(count):
+        x, y, z = points[i, 0] - centre[0], points[i, 1] - centre[1], points[i, 2] - centre[2]
+        nx, ny, nz = normals[i, 0], normals[i, 1], normals[i, 2]
+        tx, ty, tz = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+        first, second = moves[bodies[i, 0]], moves[bodies[i, 1]]
+        for v in range(nv):
+            sign = second[v] - first[v]
+            if sign == 0.0:
+                out[i, v] = 0.0
+                continue
+            turn = tx * cdof[v, 0] + ty * cdof[v, 1] + tz * cdof[v, 2]
+            out[i, v] = sign * (turn + nx * cdof[v, 3] + ny * cdof[v, 4] + nz * cdof[v, 5])
+    return out
+
+
+@_compiled
+def coupled_squares(jacobian: Array, coupling: Array, force: Array) -> tuple[Array, Array]:
+    """H = Σ_d J_dᵀ M J_d and g = Σ_d J_dᵀ f_d of (3, K, nv) Jacobians, which are sparse.
+
+    Args:
+        jacobian: (3, K, nv).
+        coupling: (K, K) M, symmetric.
+        force: (K, 3) f.
+    """
+    count, nv = jacobian.shape[1:]
+    H, g = np.zeros((nv, nv)), np.zeros(nv)
+    row = np.empty(nv)
+    for d in range(3):
+        for k in range(count):
+            row[:] = 0.0
+            for j in range(count):
+                weight = coupling[k, j]
+                if weight != 0.0:
+                    for v in range(nv):
+                        row[v] += weight * jacobian[d, j, v]
+            for u in range(nv):
+                slope = jacobian[d, k, u]
+                if slope != 0.0:
+                    g[u] += slope * force[k, d]
+                    for v in range(u, nv):
+                        H[u, v] += slope * row[v]
+    for u in range(nv):
+        for v in range(u):
+            H[u, v] = H[v, u]
+    return H, g
+
+
+@_compiled
+def weighted_squares(
+    jacobian: Array, residual: Array, weights: Array
+) -> tuple[Array, Array, float]:
+    """H = JᵀWJ, g = JᵀWr and ½ rᵀWr of (N, nv) rows, which are sparse."""
+    count, nv = jacobian.shape
+    H, g, value = np.zeros((nv, nv)), np.zeros(nv), 0.0
+    for i in range(count):
+        value += 0.5 * weights[i] * residual[i] * residual[i]
+        for u in range(nv):
+            slope = weights[i] * jacobian[i, u]
+            if slope != 0.0:
+                g[u] += slope * residual[i]
+                for v in range(u, nv):
+                    H[u, v] += slope * jacobian[i, v]
+    for u in range(nv):
+        for v in range(u):
+            H[u, v] = H[v, u]
+    return H, g, value
+
+
+@_compiled
+def worst_violations(lower: Array, upper: Array, kind: Array, kinds: int) -> Array:
+    """(kinds,) largest violation of lower ≤ 0 ≤ upper by kind, 0 for none."""
+    worst = np.zeros(kinds)
+    for i in range(len(kind)):
+        excess = max(lower[i], -upper[i])
+        worst[kind[i]] = max(worst[kind[i]], excess)
+    return worst
+
+
+@_compiled
+def contact_sides(
+    geoms: Array, geom_bodies: Array, distances: Array, moves: Array, tolerance: float
+) -> tuple[Array, Array, Array]:
+    """Bodies, sort and bound of N contacts: n·(J₂ - J₁) dq ≥ lower.
+
+    Args:
+        geoms: (N, 2) geoms.
+        geom_bodies: Geom to body.
+        distances: (N,).
+        moves: (nbody, nv); the first degree of freedom moves every body of the robot, and nothing
+            else.
+        tolerance: Accepted depth of what is not between two bodies of the robot.
+
+    Returns:
+        (N, 2) bodies, (N,) whether both belong to the robot, (N,) lower.
+    """
+    count = len(distances)
+    bodies, own, lower = np.empty((count, 2), np.int64), np.empty(count, np.bool_), np.empty(count)
+    for i in range(count):
+        first, second = geom_bodies[geoms[i, 0]], geom_bodies[geoms[i, 1]]
+        bodies[i, 0], bodies[i, 1] = first, second
+        own[i] = moves[first, 0] != 0.0 and moves[second, 0] != 0.0
+        lower[i] = -distances[i] if own[i] else -distances[i] - tolerance
+    return bodies, own, lower
+
+
+@_compiled
+def nearest_box(
+    xpos: Array, xmat: Array, geoms: Array, half: Array, radius: Array, place: Array
+) -> tuple[int, Array, float]:
+    """The box, grown by a radius, that is nearest to a place.
+
+    Args:
+        xpos: Places of all geoms.
+        xmat: Rotations of all geoms.
+        geoms: (G,) the boxes' geoms.
+        half: (G, 3) half extents.
+        radius: (G,).
+        place: (3,).
+
+    Returns:
+        Its index in ``geoms``, the (3,) way from the box that is not grown to the place, and its
+        length.
+    """
+    best, least, length = 0, np.inf, 0.0
+    local, away = np.empty(3), np.zeros(3)
+    for i in range(len(geoms)):
+        R, centre = xmat[geoms[i]], xpos[geoms[i]]
+        square = 0.0
+        for j in range(3):
+            along = 0.0
+            for k in range(3):
+                along += R[3 * k + j] * (place[k] - centre[k])
+            local[j] = along - min(max(along, -half[i, j]), half[i, j])
+            square += local[j] * local[j]
+        distance = np.sqrt(square)
+        if distance - radius[i] < least:
+            best, least, length = i, distance - radius[i], distance
+            for k in range(3):
+                away[k] = R[3 * k] * local[0] + R[3 * k + 1] * local[1] + R[3 * k + 2] * local[2]
+    return best, away, length

@@ -1,0 +1,63 @@
+"""The compiled loops are the formulas they are documented with."""
+
+import numpy as np
+import pytest
+
+from omni_envs.retargeting import kernels
+from omni_envs.rotations import exp, rotate
+
+rng = np.random.default_rng(0)
+
+
+def sparse(*shape):
+    return rng.normal(size=shape) * (rng.random(shape) < 0.4)
+
+
+def test_coupled_squares():
+    J, half, force = sparse(3, 5, 8), sparse(5, 5), rng.normal(size=(5, 3))
+    M = half @ half.T
+    H, g = kernels.coupled_squares(J, M, force)
+    np.testing.assert_allclose(H, sum(J[d].T @ M @ J[d] for d in range(3)), atol=1e-12)
+    np.testing.assert_allclose(g, sum(J[d].T @ force[:, d] for d in range(3)), atol=1e-12)
+    np.testing.assert_array_equal(H, H.T)
+
+
+def test_weighted_squares():
+    J, r, w = sparse(6, 8), rng.normal(size=6), rng.random(6)
+    H, g, value = kernels.weighted_squares(J, r, w)
+    np.testing.assert_allclose(H, J.T @ np.diag(w) @ J, atol=1e-12)
+    np.testing.assert_allclose(g, J.T @ (w * r), atol=1e-12)
+    assert value == pytest.approx(0.5 * w @ r**2)
+
+
+def test_worst_violations_by_kind():
+    lower, upper = np.array([-1.0, 0.5, -2.0, 0.1]), np.array([1.0, 2.0, -0.3, np.inf])
+    worst = kernels.worst_violations(lower, upper, np.array([0, 2, 2, 2]), 3)
+    np.testing.assert_array_equal(worst, [0.0, 0.0, 0.5])
+
+
+def test_contact_sides():
+    moves = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    geom_bodies = np.array([0, 1, 2, 2], np.int32)
+    geoms, distances = np.array([[0, 2], [1, 3]], np.int32), np.array([-0.01, 0.02])
+    bodies, own, lower = kernels.contact_sides(geoms, geom_bodies, distances, moves, 0.001)
+    np.testing.assert_array_equal(bodies, [[0, 2], [1, 2]])
+    np.testing.assert_array_equal(own, [False, True])
+    np.testing.assert_allclose(lower, [0.009, -0.02])
+
+
+def test_nearest_box():
+    half, radius = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.1]]), np.array([0.0, 0.05])
+    centres, turns = rng.normal(size=(2, 3)), exp(rng.normal(size=(2, 3)))
+    matrices = np.stack([rotate(turns, np.tile(axis, (2, 1))) for axis in np.eye(3)], axis=-1)
+    geoms = np.arange(2)
+    for i in range(2):
+        way = rotate(turns[i], np.array([0.0, 0.0, 0.07]))
+        place = centres[i] + rotate(turns[i], [0.0, 0.0, half[i, 2]]) + way
+        found, away, length = kernels.nearest_box(
+            centres, matrices.reshape(2, 9), geoms, half, radius, place
+        )
+        assert found == i and length == pytest.approx(0.07)
+        np.testing.assert_allclose(away, way, atol=1e-12)
+    inside = kernels.nearest_box(centres, matrices.reshape(2, 9), geoms, half, radius, centres[0])
+    assert inside[0] == 0 and inside[2] == 0.0 and not inside[1].any()
