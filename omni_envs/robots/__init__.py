@@ -3,9 +3,10 @@
 Adding a robot takes one pair of files, here or in a package of your own:
 
 1. ``mine.xml``, an MJCF: one free joint, then hinges; inertia in ``<inertial>`` elements; no
-   actuators, no floor. Every geom is in a group: 2 looks, 3 collides, 4 flat soles (kinematics), 5
-   sole points (physics). Hands, forearms, knees, torso and feet collide with ``condim="3"``. Use
-   few and simple geoms, each is paid for in every step; ``<exclude>`` the pairs that touch at rest.
+   actuators, no floor. Every geom is in a group: 2 looks, 3 collides, 4 flat soles and fine hulls
+   (kinematics), 5 sole points and coarse hulls (physics). Hands, forearms, knees, torso and feet
+   collide with ``condim="3"``. In physics use few and simple geoms, each is paid for in every step;
+   ``<exclude>`` the pairs that touch at rest.
 2. ``mine.py``, a ``Robot``: drives in model order, the 15 keypoints (hip, knee, ankle, shoulder and
    elbow at the joints; the toe at the tip of the sole; the hand where the wrist ends), soles,
    contact links, tracked bodies, and a default pose whose soles lie on the ground.

@@ -247,10 +247,10 @@ def test_every_limb_carries_friction(build: str) -> None:
         if g != ground:
             assert model.geom_condim[g] >= 3 and model.geom_friction[g, 0] >= 0.5
             touching.add(model.body(model.geom_bodyid[g]).name)
-    limbs = ("hip_roll", "hip_yaw", "knee", "ankle_roll", "shoulder_yaw", "elbow", "wrist_yaw")
+    limbs = ("hip_yaw", "knee", "ankle_roll", "shoulder_yaw", "elbow", "wrist_yaw")
     assert touching >= {"pelvis", "torso_link", *(f"{s}_{b}_link" for s in SIDES for b in limbs)}
     # Every geom is paid for in every step: mind the count.
-    assert model.ngeom < 65
+    assert model.ngeom < {"kinematics": 65, "physics": 45}[build]
 
 
 def test_soles_are_flat_and_touch_the_ground() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from omni_envs.errors import FileFormatError, InvalidDataError
-from omni_envs.robots import G1, Actuator, Foot
+from omni_envs.robots import G1, H1, T1, Actuator, Foot, Robot
 
 
 def without(table: dict, name: str) -> dict:
@@ -154,3 +154,59 @@ def test_action_scale_is_a_quarter_of_the_effort_over_stiffness() -> None:
 def test_a_sole_has_corners_and_a_toe() -> None:
     with pytest.raises(InvalidDataError, match="Foot 'left': sole must be"):
         Foot("left", ((0.0, 0.0, 0.0),))
+
+
+def _surface(geom: tuple, rng: np.random.Generator) -> np.ndarray:
+    """(K, 3) points on a geom."""
+    kind, size, position, rotation = geom
+    if kind == int(mujoco.mjtGeom.mjGEOM_BOX):
+        local = rng.uniform(-1, 1, (400, 3))
+        local[np.arange(400), rng.integers(3, size=400)] = rng.choice([-1, 1], 400)
+        local *= size
+    else:
+        local = rng.normal(size=(400, 3))
+        local *= size[0] / np.linalg.norm(local, axis=1, keepdims=True)
+        local[:, 2] += size[1] * rng.uniform(-1, 1, 400).round()
+    return local @ rotation.T + position
+
+
+def _depth(points: np.ndarray, geoms: list[tuple]) -> np.ndarray:
+    """(K,) signed distances of points to the union of geoms, m."""
+    distances = []
+    for kind, size, position, rotation in geoms:
+        local = np.abs((points - position) @ rotation)
+        if kind == int(mujoco.mjtGeom.mjGEOM_BOX):
+            outside = local - size
+            away = np.linalg.norm(np.maximum(outside, 0), axis=1)
+            distances.append(away + np.minimum(outside.max(1), 0))
+        else:
+            local[:, 2] = np.maximum(local[:, 2] - size[1], 0)
+            distances.append(np.linalg.norm(local, axis=1) - size[0])
+    return np.min(distances, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("robot", "outside", "uncovered"),
+    [(G1, 0.015, 0.045), (H1, 0.010, 0.010), (T1, 0.005, 0.022)],
+    ids=lambda value: getattr(value, "name", None),
+)
+def test_coarse_hulls_of_physics_follow_the_fine_ones(
+    robot: Robot, outside: float, uncovered: float
+) -> None:
+    model, rng = robot.model, np.random.default_rng(0)
+    data = mujoco.MjData(model)
+    data.qpos[3] = 1.0
+    mujoco.mj_kinematics(model, data)
+    groups: dict[int, list[tuple]] = {3: [], 4: [], 5: []}
+    for g in range(model.ngeom):
+        kind, group = int(model.geom_type[g]), int(model.geom_group[g])
+        size = model.geom_size[g] * (kind != int(mujoco.mjtGeom.mjGEOM_SPHERE) or (1, 0, 0))
+        if group in groups and "sole" not in model.geom(g).name:
+            groups[group].append((kind, size, data.geom_xpos[g], data.geom_xmat[g].reshape(3, 3)))
+    fine, coarse = groups[3] + groups[4], groups[3] + groups[5]
+    for hulls, others, limit in ((groups[5], fine, outside), (groups[4], coarse, uncovered)):
+        own = groups[5] if hulls is groups[5] else groups[4]
+        points = np.concatenate([_surface(g, rng) for g in hulls])
+        points = points[_depth(points, own) > -1e-9]
+        assert len(points) > 100
+        assert _depth(points, others).max() < limit
