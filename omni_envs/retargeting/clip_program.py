@@ -122,7 +122,20 @@ class ClipProgram:
         if self.source.object_poses is not None:
             self.configuration.place_object(self.source.object_poses[t])
 
-    def linearise(self, qpos: np.ndarray, start: int, stop: int, radius: float) -> ClipQP:
+    def depths(self, qpos: np.ndarray, start: int, stop: int) -> np.ndarray:
+        """(F,) how far the frames [start, stop) of a motion penetrate anything, m."""
+        depths = np.zeros(stop - start)
+        for i, t in enumerate(range(start, stop)):
+            self.place(t)
+            self.configuration.update(qpos[t])
+            rows = self.contact.rows(self.configuration)
+            if rows is not None:
+                depths[i] = rows.lower.max(initial=0.0)
+        return depths
+
+    def linearise(
+        self, qpos: np.ndarray, start: int, stop: int, radius: float | np.ndarray
+    ) -> ClipQP:
         """The program of the frames [start, stop) for a step of at most ``radius`` per coordinate.
 
         The frames around them stay where they are.
@@ -131,8 +144,9 @@ class ClipProgram:
             qpos: (T, nq) the motion to linearise about.
             start: First frame.
             stop: End of the frames.
-            radius: Half width of the box about the motion.
+            radius: Half width of the box about the motion, of all or of each of the frames.
         """
+        radius = np.broadcast_to(radius, stop - start)
         contacts: list[Rows] = []
         touches: list[Quadratic | None] = []
 
@@ -211,9 +225,10 @@ class ClipProgram:
         g += gradient[start:stop]
         return D[start : stop - 1], E[start : max(stop - 2, start)]
 
-    def _box(self, joints: np.ndarray, radius: float) -> Band:
+    def _box(self, joints: np.ndarray, radius: np.ndarray) -> Band:
         """The box about the motion, cut by the joint limits."""
-        upper = np.full((len(joints), self.robot.nv), radius)
+        radius = radius[:, None]
+        upper = np.repeat(radius, self.robot.nv, axis=1)
         lower = -upper
         low, high = self.robot.reference_joint_ranges.T
         # An interior point needs an interior; rounding is undone by the restoration.
@@ -221,12 +236,12 @@ class ClipProgram:
         upper[:, 6:] = np.clip(high - joints, 1e-7, radius)
         return Band(lower, upper)
 
-    def _change(self, joints: np.ndarray, radius: float) -> Band:
+    def _change(self, joints: np.ndarray, radius: np.ndarray) -> Band:
         """Speed limits, where the box lets the motion reach them."""
         lower = np.full((len(joints) - 1, self.robot.nv), -np.inf)
         upper, steps = -lower, np.diff(joints, axis=0)
         limit = self._step * (1.0 - _RESERVE)
-        near = np.abs(steps) + 2.0 * radius > limit
+        near = np.abs(steps) + (radius[1:] + radius[:-1])[:, None] > limit
         lower[:, 6:] = np.where(near, np.minimum(-limit - steps, -1e-7), -np.inf)
         upper[:, 6:] = np.where(near, np.maximum(limit - steps, 1e-7), np.inf)
         return Band(lower, upper)

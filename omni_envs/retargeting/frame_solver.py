@@ -8,13 +8,18 @@ import numpy as np
 
 from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
-from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
+from omni_envs.retargeting.limits import BoundLimit, RowLimit
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.qp import StepQP, step_bounds, step_model, step_rows
+from omni_envs.retargeting.restoration import restore as restore_constraints
+from omni_envs.retargeting.restoration import row_violations
 from omni_envs.retargeting.solver import StepSolver
 from omni_envs.retargeting.tasks import CostTask
 
+<<<<<<< HEAD
 _KINDS = (STANCE, SELF, CONTACT)  # as they are numbered
+=======
+>>>>>>> 2f8e153 (Refinement: led around what it moves into; one restoration with steps in proportion to what they repair)
 _DEEP = 5e-3  # m
 
 
@@ -90,7 +95,7 @@ class FrameSolver:
             H, g, before = step_model(configuration, self.tasks)
             lower, upper = step_bounds(configuration, self.bounds)
             rows = step_rows(configuration, self.row_limits)
-            if fallback is not None and max(_violations(rows)[1:]) > _DEEP:
+            if fallback is not None and max(row_violations(rows)[1:]) > _DEEP:
                 configuration.update(fallback)
                 fallback = None
                 continue
@@ -106,9 +111,12 @@ class FrameSolver:
                 break
         if not restore:
             return FrameResult(configuration.data.qpos.copy(), steps, (0.0, 0.0, 0.0), soft)
-        repairs, violations, repair_soft = self._restore(radius)
+        repairs, violations, repair_soft = restore_constraints(
+            configuration, self.bounds, self.row_limits, self.solver, self.options
+        )
         q = configuration.data.qpos.copy()
         return FrameResult(q, steps + repairs, violations, soft or repair_soft)
+<<<<<<< HEAD
 
     def _restore(self, radius: float) -> tuple[int, tuple[float, float, float], bool]:
         """Shortest steps onto the true constraints, which linearisation may have left violated."""
@@ -135,3 +143,5 @@ def _violations(rows: Rows) -> tuple[float, float, float]:
     """Largest violation at dq = 0 by kind."""
     stance, own, contact = kernels.worst_violations(*rows[1:], kinds=len(_KINDS)).tolist()
     return stance, own, contact
+=======
+>>>>>>> 2f8e153 (Refinement: led around what it moves into; one restoration with steps in proportion to what they repair)

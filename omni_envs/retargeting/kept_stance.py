@@ -79,8 +79,10 @@ def stance_windows(
             places = feet[run, foot, :, :2] @ turned.T
             axes[run, foot] = turned
             centre[run, foot, TIP], slack[run, foot, TIP] = _tip_window(places[:, TIP], options)
+            # Where the tip may be from where it began.
+            room = centre[run, foot, TIP][0] - places[0, TIP]
             centre[run, foot, HEART], slack[run, foot, HEART] = _heart_window(
-                places[:, HEART], options
+                places[:, HEART], room, options
             )
     planted, anchored = tiers >= LOOSE, tiers == ANCHORED
     planted, anchored = (flags[1:] & flags[:-1] for flags in (planted, anchored))
@@ -103,7 +105,9 @@ def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray,
     return centre, np.full(places.shape, 0.5 * options.tolerance)
 
 
-def _heart_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
+def _heart_window(
+    places: np.ndarray, room: np.ndarray, options: StanceOptions
+) -> tuple[np.ndarray, np.ndarray]:
     """(F, 2) centres and half widths about the places of a heart: what it did since the start."""
     moved = places - places[0]
     low, high = moved.min(axis=0), moved.max(axis=0)
@@ -112,6 +116,8 @@ def _heart_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarra
         # Nowhere in the window is further from the start than the heart was, tolerances included.
         part = max(np.linalg.norm(moved, axis=1).max() - 2.0 * options.tolerance, 0.0) / corner
         low, high = part * low, part * high
+    # A flat foot whose tip is in its window must be in this one: it is as long as it is.
+    low, high = np.minimum(low, room), np.maximum(high, room)
     half = np.repeat(np.maximum(0.5 * (high - low), options.tolerance)[None], len(places), axis=0)
     centre = np.repeat((places[0] + 0.5 * (low + high))[None], len(places), axis=0)
     centre[0], half[0] = places[0], options.tolerance

@@ -18,11 +18,13 @@ import numpy as np
 from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import ProgressCallback
 from omni_envs.retargeting.clip_program import ClipProgram, moved
+from omni_envs.retargeting.detour import led_around
 from omni_envs.retargeting.interior_point import solve_clip_qp
 from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
-from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit
+from omni_envs.retargeting.limits import BoundLimit
 from omni_envs.retargeting.options import RetargetOptions
-from omni_envs.retargeting.qp import StepQP, step_bounds, step_rows
+from omni_envs.retargeting.qp import step_bounds
+from omni_envs.retargeting.restoration import restore
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.robots import KEYPOINTS, Robot, get_robot
@@ -31,7 +33,6 @@ from omni_envs.robots import KEYPOINTS, Robot, get_robot
 # influence of a frame has faded there.
 _WINDOW, _CONTEXT = 320, 24
 _RELAXED = 2e-4
-_REPAIR = 0.1  # m and rad: longest step of a coordinate that repairs a frame
 
 
 @dataclass(frozen=True)
@@ -91,8 +92,8 @@ def refine(
         qpos,
         retargeted.nominal,
     )
-    total, done = frames * (len(options.radii) + 1), 0
-    for radius in options.radii:
+    total = frames * (len(options.radii) + 1)
+    for number, radius in enumerate(options.radii):
         x = np.zeros((frames, robot.nv))
         for start, stop, keep in _windows(frames):
             solution = solve_clip_qp(
@@ -100,8 +101,9 @@ def refine(
             )
             x[keep] = solution.x[keep.start - start : keep.stop - start]
             if progress is not None:
-                progress(done + keep.stop, total)
-        qpos, done = moved(qpos, x), done + frames
+                progress(number * frames + keep.stop, total)
+        qpos = moved(qpos, x)
+    qpos = led_around(program, retargeted.qpos, qpos, options.tolerance)
 
     restoration = _Restoration(program, robot, retargeted.options)
     qpos = qpos.copy()
@@ -111,7 +113,7 @@ def refine(
         qpos[t], steps[t], violations[t] = restoration.restore(t, qpos[t])
         keypoints[t] = program.configuration.keypoints()
         if progress is not None:
-            progress(done + t + 1, total)
+            progress(total - frames + t + 1, total)
     energy = program.mesh.energy(keypoints)
     record = _record(retargeted, energy, steps, violations, perf_counter() - begin)
     return replace(retargeted, qpos=qpos, frames=record)
@@ -172,27 +174,12 @@ class _Restoration:
         program.stance.hold(t)
         if self._velocity is not None:
             self._velocity.set_previous(self._previous)
-        metric, zero = configuration.metric, np.zeros(configuration.model.nv)
         # Limits of single joints need no program.
         inside = np.clip(0.0, *step_bounds(configuration, self._bounds))
         if inside.any():
             configuration.update(configuration.step(inside))
-        for step in range(self._options.restoration_iterations + 1):
-            rows = step_rows(configuration, [program.contact, program.stance])
-            excess = np.maximum(rows.lower, -rows.upper)
-            left = tuple(
-                float(excess[rows.kind == kind].max(initial=0.0))
-                for kind in (STANCE, SELF, CONTACT)
-            )
-            last = step == self._options.restoration_iterations
-            if last or max(left) <= self._options.restoration_tolerance:
-                break
-            lower, upper = step_bounds(configuration, self._bounds)
-            # Where rows contradict each other the shortest step may be absurdly long.
-            np.clip(lower, -_REPAIR, 0.0, out=lower)
-            np.clip(upper, 0.0, _REPAIR, out=upper)
-            dq, _ = solve_daqp(StepQP(np.diag(metric), zero, lower, upper, rows, metric, np.inf))
-            configuration.update(configuration.step(dq))
+        limits = [program.contact, program.stance]
+        restored = restore(configuration, self._bounds, limits, solve_daqp, self._options)
         self._previous = configuration.data.qpos.copy()
         program.stance.record(configuration)
-        return self._previous, step, left
+        return self._previous, restored.steps, restored.violations
