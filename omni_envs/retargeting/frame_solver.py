@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import BoundLimit, RowLimit
 from omni_envs.retargeting.options import RetargetOptions
@@ -16,10 +15,6 @@ from omni_envs.retargeting.restoration import row_violations
 from omni_envs.retargeting.solver import StepSolver
 from omni_envs.retargeting.tasks import CostTask
 
-<<<<<<< HEAD
-_KINDS = (STANCE, SELF, CONTACT)  # as they are numbered
-=======
->>>>>>> 2f8e153 (Refinement: led around what it moves into; one restoration with steps in proportion to what they repair)
 _DEEP = 5e-3  # m
 
 
@@ -116,32 +111,3 @@ class FrameSolver:
         )
         q = configuration.data.qpos.copy()
         return FrameResult(q, steps + repairs, violations, soft or repair_soft)
-<<<<<<< HEAD
-
-    def _restore(self, radius: float) -> tuple[int, tuple[float, float, float], bool]:
-        """Shortest steps onto the true constraints, which linearisation may have left violated."""
-        configuration, soft = self.configuration, False
-        metric = configuration.metric
-        for repairs in range(self.options.restoration_iterations + 1):
-            rows = step_rows(configuration, self.row_limits)
-            violations = _violations(rows)
-            if (
-                max(violations) <= self.options.restoration_tolerance
-                or repairs == self.options.restoration_iterations
-            ):
-                break
-            lower, upper = step_bounds(configuration, self.bounds)
-            zero = np.zeros(len(metric))
-            dq, soft = self.solver(
-                StepQP(np.diag(metric), zero, lower, upper, rows, metric, radius)
-            )
-            configuration.update(configuration.step(dq))
-        return repairs, violations, soft
-
-
-def _violations(rows: Rows) -> tuple[float, float, float]:
-    """Largest violation at dq = 0 by kind."""
-    stance, own, contact = kernels.worst_violations(*rows[1:], kinds=len(_KINDS)).tolist()
-    return stance, own, contact
-=======
->>>>>>> 2f8e153 (Refinement: led around what it moves into; one restoration with steps in proportion to what they repair)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
 from omni_envs.retargeting.options import RetargetOptions
@@ -14,7 +15,7 @@ from omni_envs.retargeting.qp import StepQP, step_bounds, step_rows
 from omni_envs.retargeting.softness import softness
 from omni_envs.retargeting.solver import StepSolver
 
-KINDS = (STANCE, SELF, CONTACT)
+KINDS = (STANCE, SELF, CONTACT)  # as they are numbered
 """Kinds of rows in the order of ``result.RELAXATIONS``."""
 
 # Longest step of a coordinate, m and rad: this many times the largest violation (m), within limits.
@@ -40,8 +41,7 @@ class Restored(NamedTuple):
 
 def row_violations(rows: Rows) -> tuple[float, float, float]:
     """Largest violation at dq = 0 by kind, m."""
-    excess = np.maximum(rows.lower, -rows.upper)
-    stance, own, contact = (float(excess[rows.kind == k].max(initial=0.0)) for k in KINDS)
+    stance, own, contact = kernels.worst_violations(*rows[1:], kinds=len(KINDS)).tolist()
     return stance, own, contact
 
 
