@@ -51,7 +51,6 @@ def terrain_contacts(
     Returns:
         Link to (T,) bool, and link to (T, 3) touched points in the world, m.
     """
-
     parts = terrain.parts if terrain is not None else ()
     uneven = terrain.heightfield if terrain is not None else None
 

@@ -42,12 +42,14 @@ class StanceWindows:
         slack: (T, 2, 2, 2) half width of the window, infinite for none, m.
         steps: (T, 2, 3) largest step of the tip since the previous frame, m, along x, y and z;
             infinite for none.
+        heights: (T, 2) height of the tips in the motion, m.
     """
 
     axes: np.ndarray
     centre: np.ndarray
     slack: np.ndarray
     steps: np.ndarray
+    heights: np.ndarray
 
 
 def stance_windows(
@@ -91,7 +93,7 @@ def stance_windows(
     steps = np.full((frames, 2, 3), np.inf)
     steps[1:, :, :2] = np.where(planted & ~anchored, slow, np.inf)[..., None]
     steps[1:, :, 2] = np.where(planted, rise, np.inf)
-    return StanceWindows(axes, centre, slack, steps)
+    return StanceWindows(axes, centre, slack, steps, feet[:, :, TIP, 2])
 
 
 def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
@@ -169,9 +171,13 @@ class KeptStance(RowLimit):
         places, jacobian = places.reshape(2, 2, 3), jacobian.reshape(2, 2, 3, -1)
         offset = self._offsets(places[..., :2])[held]
         moved, step = (places[:, TIP] - self._tips)[slow], windows.steps[t][slow]
+        # A tip that a repair has lifted may always come back to the height it had: else every
+        # repair of the next frames would lift it a little further.
+        back = np.zeros((2, 3))
+        back[:, 2] = np.minimum(windows.heights[t] - self._tips[:, 2], 0.0)
         turned = windows.axes[t][:, None] @ jacobian[:, :, :2]
         A = np.concatenate([turned[held], jacobian[:, TIP][slow]])
-        lower = np.concatenate([-slack[held] - offset, -step - moved])
+        lower = np.concatenate([-slack[held] - offset, np.minimum(-step, back[slow]) - moved])
         upper = np.concatenate([slack[held] - offset, step - moved])
         return Rows(A, lower, upper, np.full(len(lower), STANCE))
 

@@ -124,7 +124,7 @@ class HeightField:
     def _cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(P, 2) column and row of the cell of every place, and (P,) whether it is in the field."""
         at, most = self._grid(points), np.array(self.heights.shape)[::-1] - 1
-        inside = ((at >= 0) & (at <= most)).all(axis=1)
+        inside = np.all((at >= 0) & (at <= most), axis=1)
         return np.clip(np.floor(at).astype(int), 0, most - 1), inside
 
 

@@ -85,12 +85,12 @@ def slope_onto_block(
     if not 0 < angle < np.deg2rad(80.0):
         raise InvalidDataError(owner, "angle", "between 0 and 80° (rad)", repr(angle))
     length, side = float(height / np.tan(angle)), 0.5 * float(width)
-    wedge = np.array(
-        [[x, y, z] for y in (-side, side) for x, z in ((0, 0), (length, 0), (length, height))]
-    ) + [float(foot), 0.0, 0.0]
+    start, end = float(foot), float(foot) + length
+    profile = ((start, 0.0), (end, 0.0), (end, float(height)))
+    wedge = np.array([[x, y, z] for y in (-side, side) for x, z in profile])
     faces = [[0, 1, 2], [3, 5, 4], [0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [0, 2, 5], [0, 5, 3]]
     half = (0.5 * float(depth), side, 0.5 * float(height))
-    block = Part(Box(half), (float(foot) + length + half[0], 0.0, half[2]))
+    block = Part(Box(half), (end + half[0], 0.0, half[2]))
     return Scene(terrain=Terrain((Part(ConvexMesh(wedge, np.array(faces))), block)))
 
 

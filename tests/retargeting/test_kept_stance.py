@@ -141,3 +141,22 @@ def test_a_landing_beside_the_window_moves_the_stance(robot):
         limit.record(kinematics)
     assert worst[0] is None and worst[1] <= 0.0 and worst[2] <= 1e-12
     assert worst[3] > 1e-4  # and from there it may not come back
+
+
+def test_a_lifted_foot_may_come_down_at_once_but_not_rise(robot):
+    kinematics, points = robot
+    qpos = np.tile(G1.default_qpos, (3, 1))
+    windows = stance_windows(feet_of(kinematics, points, qpos), tiers(3), FPS, OPTIONS)
+    lifted, higher = qpos[1].copy(), qpos[1].copy()
+    lifted[2] += 0.02
+    higher[2] += 0.03
+    for last, allowed in ((qpos[2], True), (higher, False)):
+        limit = KeptStance(windows, kinematics)
+        for t, q in enumerate((qpos[0], lifted)):
+            limit.hold(t)
+            kinematics.update(q)
+            limit.record(kinematics)
+        limit.hold(2)
+        kinematics.update(last)
+        rows = limit.rows(kinematics)
+        assert (np.maximum(rows.lower, -rows.upper).max() <= 1e-9) == allowed
