@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from omni_envs.tracking.config import TrackingConfig
+from omni_envs.tracking.config import NoiseGrowth, TrackingConfig
 from omni_envs.tracking.motion import MotionLibrary
 
 GATE_EPISODES = 100
@@ -40,6 +40,40 @@ class ObjectGate:
         self._recent.extend(lasted / possible)
         full = len(self._recent) == GATE_EPISODES
         self.open = full and float(np.mean(self._recent)) >= self._share
+
+
+class NoiseLevel:
+    """How much of the start noise episodes get; see ``NoiseGrowth``.
+
+    Args:
+        config: How it grows, or None: all of it, always.
+    """
+
+    def __init__(self, config: NoiseGrowth | None) -> None:
+        self._config = config
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets all episodes."""
+        self.level = 1.0 if self._config is None else 0.0
+        self._episodes, self._lasted, self._possible = 0, 0, 0
+
+    def record(self, lasted: np.ndarray, possible: np.ndarray) -> None:
+        """Counts finished episodes: (K,) control steps they lasted and could have lasted."""
+        if self._config is None:
+            return
+        self._episodes += len(lasted)
+        self._lasted += int(lasted.sum())
+        self._possible += int(possible.sum())
+        if self._episodes >= GATE_EPISODES:
+            good = self._lasted >= self._config.share * self._possible
+            level = self.level + (self._config.step if good else -self._config.step)
+            self.level = min(max(level, 0.0), 1.0)
+            self._episodes, self._lasted, self._possible = 0, 0, 0
+
+    def draw(self, count: int, rng: np.random.Generator) -> np.ndarray | None:
+        """Draws (count,) shares of the noise, or None: all of it."""
+        return None if self._config is None else self.level * np.sqrt(rng.random(count))
 
 
 class Episodes:

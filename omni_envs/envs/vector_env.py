@@ -20,7 +20,7 @@ from omni_envs.envs.batches import (
     put_rows,
 )
 from omni_envs.envs.divergence import Divergence, DivergenceLog
-from omni_envs.envs.episodes import Episodes, ObjectGate
+from omni_envs.envs.episodes import Episodes, NoiseLevel, ObjectGate
 from omni_envs.envs.model import build_model
 from omni_envs.envs.options import autoreset_mode_of, merged_seed, refuse_unknown
 from omni_envs.envs.pictures import Pictures
@@ -180,6 +180,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         default = self.robot.default_joint_array
         self._episodes = Episodes(self._library, default, num_envs, config, max_episode_steps)
         self._gate = ObjectGate(config.termination.object_after)
+        self._noise = NoiseLevel(config.reset.growth)
         self.sampler = MotionSampler(self._library, config.reset)
         self.divergences = DivergenceLog()
         self._scale = self.robot.action_scale * config.action.scale
@@ -204,14 +205,19 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Whether losing the object ends an episode yet; see ``ObjectGate``."""
         return self._gate.open
 
+    @property
+    def noise_level(self) -> float:
+        """Share of the start noise that episodes get; see ``NoiseGrowth``."""
+        return self._noise.level
+
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: Options | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts all simulations anew, or those of a mask.
 
         Args:
-            seed: Makes everything that follows reproducible; what adaptive sampling and the object
-                gate have learnt is forgotten.
+            seed: Makes everything that follows reproducible; what adaptive sampling, the object
+                gate and growing start noise have learnt is forgotten.
             options: ``reset_mask``: (N,) bool, the simulations to start; ``motion`` and ``frame``:
                 where to start, integers or one per started simulation, instead of a draw.
 
@@ -223,6 +229,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self._np_random, self._np_random_seed = seeding.np_random(int(value))
             self.sampler.reset()
             self._gate.reset()
+            self._noise.reset()
         options = dict(options or {})
         for name in options:
             if name not in RESET_OPTIONS:
@@ -291,7 +298,9 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         done = terminated | truncated
         finished = np.flatnonzero(done)
         if len(finished):
-            self._gate.record(episodes.elapsed[finished], episodes.possible[finished])
+            lasted = episodes.elapsed[finished], episodes.possible[finished]
+            self._gate.record(*lasted)
+            self._noise.record(*lasted)
         failed = np.flatnonzero(terminated)
         self.sampler.record(episodes.motion[failed], ended_frame[failed])
         self._push(done)
@@ -357,6 +366,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self._task.soft_lower,
             self._task.soft_upper,
             rng,
+            self._noise.draw(count, rng),
         )
         variant = self._variants.choose(self._scene_of[motions], rng)
         self.simulation.reset(ids, qpos, qvel, variant)

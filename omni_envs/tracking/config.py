@@ -243,17 +243,36 @@ class AdaptiveSampling:
 
 
 @dataclass(frozen=True)
+class NoiseGrowth:
+    """Start noise that grows with what the policy can do, for training.
+
+    Noise has a level between 0 and 1, at first 0; an episode starts with the level times √u of the
+    whole noise, u uniform in [0, 1). Whenever a hundred episodes are over, the level moves up by a
+    step if they lasted long enough, else down.
+
+    Attributes:
+        share: Long enough: this share of what they could have lasted, together.
+        step: How far the level moves.
+    """
+
+    share: float = 0.5
+    step: float = 0.02
+
+
+@dataclass(frozen=True)
 class ResetConfig:
     """Where episodes start.
 
     Attributes:
         start: ``"uniform"`` over all frames, ``"start"`` of a motion, or ``"adaptive"``.
         noise: Noise on the start state, or None.
+        growth: How the noise grows in training, or None: all of it from the first episode on.
         adaptive: How adaptive sampling weighs failures.
     """
 
     start: Literal["uniform", "start", "adaptive"] = "uniform"
     noise: ResetNoise | None = ResetNoise()
+    growth: NoiseGrowth | None = None
     adaptive: AdaptiveSampling = AdaptiveSampling()
 
 

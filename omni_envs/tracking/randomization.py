@@ -23,6 +23,7 @@ def start_state(
     lower: np.ndarray,
     upper: np.ndarray,
     rng: np.random.Generator,
+    share: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Disturbs start states.
 
@@ -33,6 +34,7 @@ def start_state(
         lower: (n,) soft lower joint limits, rad.
         upper: (n,) soft upper joint limits, rad.
         rng: Source of chance.
+        share: (K,) share of the noise that each start state gets, all of it by default.
 
     Returns:
         Fresh qpos and qvel. The root is turned about the world's axes and keeps its angular
@@ -51,6 +53,8 @@ def start_state(
         *[noise.joint_position] * n,
     )
     draws = symmetric(rng, len(qpos), widths)
+    if share is not None:
+        draws *= share[:, None]
     position, orientation, linear, spin, object_position = (
         draws[:, 3 * i : 3 * i + 3] for i in range(5)
     )

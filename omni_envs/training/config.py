@@ -27,6 +27,10 @@ class PPOConfig:
         learning_rate: Initial learning rate of Adam.
         desired_kl: The learning rate is divided by 1.5 where an update moves the policy by more
             than twice this KL divergence, multiplied where by less than half; 0 keeps it constant.
+        adapt_every: How often that happens: after every ``"minibatch"`` (rsl_rl), or every
+            ``"update"``, by the divergence of its last epoch: in small rollouts the divergence only
+            grows from one mini-batch to the next, and the former swings between too fast and too
+            slow within every update.
         gamma: Discount per control step.
         gae_lambda: λ of generalised advantage estimation.
         clip: Clipping range of the probability ratio.
@@ -43,6 +47,7 @@ class PPOConfig:
     minibatches: int = 4
     learning_rate: float = 1e-3
     desired_kl: float = 0.01
+    adapt_every: Literal["minibatch", "update"] = "minibatch"
     gamma: float = 0.99
     gae_lambda: float = 0.95
     clip: float = 0.2
@@ -56,6 +61,10 @@ class PPOConfig:
     def __post_init__(self) -> None:
         for name in ("rollout_steps", "epochs", "minibatches", "learning_rate", "initial_std"):
             _positive("PPOConfig", name, getattr(self, name))
+        if self.adapt_every not in ("minibatch", "update"):
+            raise InvalidOptionError(
+                f"PPOConfig: adapt_every must be 'minibatch' or 'update'; got {self.adapt_every!r}."
+            )
         if not self.hidden or any(width < 1 for width in self.hidden):
             raise InvalidOptionError(f"PPOConfig: hidden must be widths ≥ 1; got {self.hidden}.")
 

@@ -164,10 +164,11 @@ class TrackingPPO(PPO):
         config, policy = self.config, self.policy
         policy.set_training_mode(True)
         totals: Counter[str] = Counter()
+        last = 0.0
         # Actor and critic share no weights: each learns in its own thread, so that two cores are
         # busy without waiting for each other inside every small matrix product.
         with ThreadPoolExecutor(1) as second:
-            for _ in range(config.epochs):
+            for epoch in range(config.epochs):
                 for batch in rollout.minibatches(config.minibatches):
                     policy.optimizer.zero_grad()
                     value = second.submit(self._critic_backward, batch)
@@ -177,11 +178,16 @@ class TrackingPPO(PPO):
                             f"Training diverged after {self.num_timesteps} steps: {figures}. "
                             "Resume from a checkpoint with a smaller learning rate."
                         )
-                    self._adapt_learning_rate(figures["kl"])
+                    if config.adapt_every == "minibatch":
+                        self._adapt_learning_rate(figures["kl"])
                     nn.utils.clip_grad_norm_(policy.parameters(), config.max_grad_norm)
                     policy.optimizer.step()
                     totals.update(figures)
+                    if epoch == config.epochs - 1:
+                        last += figures["kl"] / config.minibatches
                 self._n_updates += 1
+        if config.adapt_every == "update":
+            self._adapt_learning_rate(last)
         steps = config.epochs * config.minibatches
         self.figures = {
             **{name: total / steps for name, total in totals.items()},

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from omni_envs.envs.episodes import GATE_EPISODES, Episodes, ObjectGate
+from omni_envs.envs.episodes import GATE_EPISODES, Episodes, NoiseLevel, ObjectGate
 from omni_envs.robots import G1
-from omni_envs.tracking.config import make_config
+from omni_envs.tracking.config import NoiseGrowth, make_config
 from omni_envs.tracking.motion import MotionLibrary
 
 
@@ -87,3 +87,29 @@ def test_the_object_gate_opens_for_good():
     gate.reset()
     assert not gate.open
     assert ObjectGate(0.0).open
+
+
+def test_start_noise_grows_with_what_episodes_last():
+    level = NoiseLevel(NoiseGrowth(share=0.5, step=0.25))
+    half = np.full(GATE_EPISODES // 2, 10)
+    assert level.level == 0.0
+    for expected in (0.0, 0.25, 0.25, 0.5):  # a step per hundred episodes
+        level.record(half // 2, half)
+        assert level.level == expected
+    level.record(np.full(GATE_EPISODES, 4), np.full(GATE_EPISODES, 10))
+    assert level.level == 0.25
+    for _ in range(9):
+        level.record(np.full(GATE_EPISODES, 10), np.full(GATE_EPISODES, 10))
+    assert level.level == 1.0
+    rng = np.random.default_rng(0)
+    share = level.draw(4000, rng)
+    np.testing.assert_allclose(np.quantile(share**2, [0.1, 0.5, 0.9]), [0.1, 0.5, 0.9], atol=0.03)
+    level.reset()
+    assert not level.draw(5, rng).any()
+
+
+def test_start_noise_that_does_not_grow_is_whole():
+    level = NoiseLevel(None)
+    level.record(np.zeros(500), np.ones(500))
+    assert level.level == 1.0
+    assert level.draw(5, np.random.default_rng(0)) is None

@@ -488,3 +488,20 @@ def test_resting_on_the_knee_costs_only_under_the_rule_any(make, quiet):
         penalties[rule] = infos["reward/contact"][0]
     assert penalties["self"] == 0
     assert penalties["any"] <= -2 * 0.1 * 0.02
+
+
+def test_start_noise_grows_in_the_environment(make, quiet):
+    reset = {"noise": {}, "growth": {"share": 0.0, "step": 0.5}}
+    env = make(8, **{**quiet, "reset": reset}, max_episode_steps=2)
+    still = make(8, **quiet)
+    env.reset(seed=0, options={"frame": 5})
+    still.reset(seed=0, options={"frame": 5})
+    np.testing.assert_array_equal(env.simulation.qpos, still.simulation.qpos)
+    assert env.noise_level == 0.0
+    for _ in range(60):  # 30 episodes per simulation
+        env.step(np.zeros((8, 29)))
+    assert env.noise_level == 1.0
+    env.reset(options={"frame": 5})
+    assert (env.simulation.qpos[:, :3] != still.simulation.qpos[:, :3]).all()
+    env.reset(seed=0)
+    assert env.noise_level == 0.0

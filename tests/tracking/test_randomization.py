@@ -101,3 +101,18 @@ def test_stretched_box_inertia():
         )
 
     np.testing.assert_allclose(scaled_inertia(box(h), s), box(h * s), atol=1e-15)
+
+
+def test_start_states_can_get_a_share_of_the_noise():
+    qpos, qvel = np.tile(np.r_[G1.default_qpos, 1, 0, 0.2, 1, 0, 0, 0], (3, 1)), np.zeros((3, 41))
+    low, high = G1.joint_ranges.T
+
+    def disturbed(share):
+        rng = np.random.default_rng(4)
+        return start_state(qpos, qvel, ResetNoise(), low, high, rng, share)
+
+    none, half, whole = disturbed(np.array([0.0, 0.5, 1.0]))[0] - qpos
+    without = disturbed(None)[0] - qpos
+    assert not none.any()
+    np.testing.assert_allclose(half[:3], 0.5 * without[1, :3])
+    np.testing.assert_array_equal(whole, without[2])

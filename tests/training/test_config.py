@@ -25,6 +25,7 @@ def test_defaults_are_the_published_ones():
         "minibatches": 4,
         "learning_rate": 1e-3,
         "desired_kl": 0.01,
+        "adapt_every": "minibatch",
         "gamma": 0.99,
         "gae_lambda": 0.95,
         "clip": 0.2,
@@ -58,6 +59,7 @@ def test_a_run_directory_may_be_moved(tmp_path):
         ({"steps": 0}, "steps must be positive; got 0"),
         ({"trainer": "rllib"}, "trainer must be 'sb3'; got 'rllib'"),
         ({"ppo": {"hidden": []}}, "hidden must be widths"),
+        ({"ppo": {"adapt_every": "epoch"}}, "adapt_every must be 'minibatch' or 'update'"),
         ({"ppo": {"epochs": -1}}, "epochs must be positive"),
     ],
 )

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,6 +109,18 @@ def test_learning_rate_follows_the_divergence(chase, kl, factor):
     learner._adapt_learning_rate(kl)
     assert learner.current_learning_rate == pytest.approx(1e-3 * factor)
     assert learner.policy.optimizer.param_groups[0]["lr"] == learner.current_learning_rate
+
+
+@pytest.mark.parametrize(("every", "count"), [("minibatch", 8), ("update", 1)])
+def test_learning_rate_is_adapted_as_often_as_asked(chase, monkeypatch, every, count):
+    learner = _learner(chase, replace(SMALL, epochs=2, minibatches=4, adapt_every=every))
+    learner.learn(1)  # feeds the normalisers only
+    seen = []
+    monkeypatch.setattr(learner, "_adapt_learning_rate", seen.append)
+    learner.learn(1, reset_num_timesteps=False)
+    assert len(seen) == count
+    if every == "update":  # the divergence of the last epoch is more than the mean one
+        assert seen[0] > learner.figures["kl"] > 0
 
 
 def test_learning_rate_stays_within_its_limits(chase):
