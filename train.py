@@ -32,7 +32,7 @@ class Arguments:
     env: str = "OmniEnvs/G1BoxCarry-v0"
     """Environment id."""
 
-    trainer: Literal["sb3"] = "sb3"
+    trainer: Literal["sb3", "torchrl"] = "sb3"
     """Library that trains."""
 
     recipe: Literal["small", "quick", "published"] = "small"

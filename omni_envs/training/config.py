@@ -12,6 +12,7 @@ from typing import Any, Literal
 from omni_envs.errors import FileFormatError, InvalidOptionError
 
 CONFIG_FILE = "config.json"
+TRAINERS = ("sb3", "torchrl")
 PRIVILEGED: Mapping[str, Any] = {"observation": {"privileged": True}}
 """Training options of an asymmetric critic."""
 
@@ -94,7 +95,7 @@ class TrainConfig:
     env: str
     out: Path
     steps: int
-    trainer: Literal["sb3"] = "sb3"
+    trainer: Literal["sb3", "torchrl"] = "sb3"
     num_envs: int = 256
     num_threads: int = 0
     seed: int = 0
@@ -108,8 +109,10 @@ class TrainConfig:
     def __post_init__(self) -> None:
         for name in ("steps", "num_envs", "checkpoint_every", "evaluation_episodes"):
             _positive("TrainConfig", name, getattr(self, name))
-        if self.trainer != "sb3":
-            raise InvalidOptionError(f"TrainConfig: trainer must be 'sb3'; got {self.trainer!r}.")
+        if self.trainer not in TRAINERS:
+            raise InvalidOptionError(
+                f"TrainConfig: trainer must be 'sb3' or 'torchrl'; got {self.trainer!r}."
+            )
         object.__setattr__(self, "out", Path(self.out))
         for name in ("env_options", "training_options"):
             try:

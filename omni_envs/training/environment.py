@@ -25,13 +25,14 @@ def make_env(config: TrainConfig, num_envs: int, options: Mapping[str, Any]) -> 
         InvalidOptionError: There is no such environment, or it has no vector form of its own.
         OmniEnvsError: An option is not valid.
     """
+    return make_vector_env(config.env, num_envs, num_threads=config.num_threads, **options)
+
+
+def make_vector_env(env: str, num_envs: int, **options: Any) -> VectorEnv:
+    """Makes a vector environment; see ``make_env``."""
     try:
         return gym.make_vec(
-            config.env,
-            num_envs=num_envs,
-            vectorization_mode="vector_entry_point",
-            num_threads=config.num_threads,
-            **options,
+            env, num_envs=num_envs, vectorization_mode="vector_entry_point", **options
         )
     except gym.error.Error as error:
-        raise InvalidOptionError(f"env {config.env!r}: {error}") from error
+        raise InvalidOptionError(f"env {env!r}: {error}") from error

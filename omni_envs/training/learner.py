@@ -47,7 +47,7 @@ class Learner(Protocol):
 
 def autoreset_mode(config: TrainConfig) -> AutoresetMode:
     """Returns the mode that the trainer of a run needs its vector environment to be in."""
-    return AutoresetMode.SAME_STEP
+    return AutoresetMode.DISABLED if config.trainer == "torchrl" else AutoresetMode.SAME_STEP
 
 
 def make_learner(config: TrainConfig, env: VectorEnv) -> Learner:
@@ -60,6 +60,10 @@ def make_learner(config: TrainConfig, env: VectorEnv) -> Learner:
     Raises:
         MissingDependencyError: The trainer is not installed.
     """
+    if config.trainer == "torchrl":
+        from omni_envs.training.torchrl_learner import TorchRLLearner
+
+        return TorchRLLearner(config, env)
     from omni_envs.training.sb3_learner import SB3Learner
 
     return SB3Learner(config, env)

@@ -14,7 +14,6 @@ import os
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +29,9 @@ except ImportError as error:
     raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
 
 from omni_envs.training.config import PPOConfig
+from omni_envs.training.learning_rate import adapted_learning_rate
 from omni_envs.training.policy import TrackingPolicy
-
-MIN_LEARNING_RATE, MAX_LEARNING_RATE = 1e-5, 1e-2
+from omni_envs.training.torch_threads import torch_threads
 
 
 @dataclass
@@ -119,7 +118,7 @@ class TrackingPPO(PPO):
 
     def collect_rollouts(self, *args: Any, **kwargs: Any) -> bool:
         """Collects a rollout with one thread for the network: the cores belong to the physics."""
-        with _threads(1):
+        with torch_threads(1):
             return super().collect_rollouts(*args, **kwargs)
 
     def train(self) -> None:
@@ -132,7 +131,7 @@ class TrackingPPO(PPO):
         """
         network = self.policy.mlp_extractor
         # Actor and critic learn at the same time: half of the cores for each.
-        with _threads(max(1, (os.cpu_count() or 1) // 2)):
+        with torch_threads(max(1, (os.cpu_count() or 1) // 2)):
             rollout = self._rollout()
             if int(network.actor_normalizer.count) > 0:
                 self._update(rollout)
@@ -222,11 +221,7 @@ class TrackingPPO(PPO):
         return {"value_loss": loss.item()}
 
     def _adapt_learning_rate(self, kl: float) -> None:
-        rate, desired = self.current_learning_rate, self.config.desired_kl
-        if desired and kl > 2.0 * desired:
-            rate = max(MIN_LEARNING_RATE, rate / 1.5)
-        elif desired and 0.0 < kl < 0.5 * desired:
-            rate = min(MAX_LEARNING_RATE, rate * 1.5)
+        rate = adapted_learning_rate(self.current_learning_rate, kl, self.config.desired_kl)
         self.current_learning_rate = rate
         for group in self.policy.optimizer.param_groups:
             group["lr"] = rate
@@ -250,13 +245,3 @@ def _gaussian_kl(mean: Tensor, std: Tensor, new_mean: Tensor, new_std: Tensor) -
     """Mean over samples of KL(old ‖ new) of diagonal Gaussians."""
     terms = torch.log(new_std / std) + (std**2 + (mean - new_mean) ** 2) / (2.0 * new_std**2) - 0.5
     return terms.sum(dim=-1).mean()
-
-
-@contextmanager
-def _threads(count: int) -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,10 +16,15 @@ HORIZON, DIMENSIONS = 20, 2
 class Chase(VectorEnv):
     """Position += 0.1 · action towards a target; ends beyond 1.0, is truncated after 20 steps."""
 
-    metadata: ClassVar = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
-
-    def __init__(self, num_envs: int = 8, privileged: bool = True) -> None:
+    def __init__(
+        self,
+        num_envs: int = 8,
+        privileged: bool = True,
+        autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
+    ) -> None:
         self.num_envs, self.privileged = num_envs, privileged
+        self.autoreset_mode = autoreset_mode
+        self.metadata = {"autoreset_mode": autoreset_mode, "render_modes": []}
         box = spaces.Box(-np.inf, np.inf, (DIMENSIONS,), np.float32)
         wide = spaces.Box(-np.inf, np.inf, (2 * DIMENSIONS,), np.float32)
         self.single_observation_space = (
@@ -33,13 +38,19 @@ class Chase(VectorEnv):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
         super().reset(seed=seed)
+        mask = (options or {}).get("reset_mask")
+        if mask is not None:
+            self._place(mask)
+            return self._observe(), {"frame": self.time.copy()}
         self.position = np.zeros((self.num_envs, DIMENSIONS))
         self.time = np.zeros(self.num_envs, int)
         self._place(np.ones(self.num_envs, bool))
         return self._observe(), {"frame": self.time.copy()}
 
     def step(self, actions: np.ndarray):
-        assert self.action_space.contains(np.asarray(actions, np.float32))
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            assert self.action_space.contains(np.asarray(actions, np.float32))
+        actions = np.clip(actions, -2.0, 2.0)
         self.position += 0.1 * actions
         self.time += 1
         distance = np.linalg.norm(self.position, axis=1)
@@ -48,7 +59,7 @@ class Chase(VectorEnv):
         truncated = self.time >= HORIZON
         infos: dict[str, Any] = {"error/body_position": distance.copy()}
         done = terminated | truncated
-        if done.any():
+        if done.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos["final_obs"], infos["_final_obs"] = self._observe(), done
             infos["final_info"] = {
                 "error/body_position": distance.copy(),

@@ -57,7 +57,7 @@ def test_a_run_directory_may_be_moved(tmp_path):
         ({"stesp": 3}, r"unknown \['stesp'\]. Valid: .*steps"),
         ({"ppo": {"gama": 0.9}}, r"TrainConfig.ppo: unknown \['gama'\]"),
         ({"steps": 0}, "steps must be positive; got 0"),
-        ({"trainer": "rllib"}, "trainer must be 'sb3'; got 'rllib'"),
+        ({"trainer": "rllib"}, "trainer must be 'sb3' or 'torchrl'; got 'rllib'"),
         ({"ppo": {"hidden": []}}, "hidden must be widths"),
         ({"ppo": {"adapt_every": "epoch"}}, "adapt_every must be 'minibatch' or 'update'"),
         ({"ppo": {"epochs": -1}}, "epochs must be positive"),

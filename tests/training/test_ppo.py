@@ -10,12 +10,8 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 from omni_envs.errors import OmniEnvsError
 from omni_envs.training.config import PPOConfig
-from omni_envs.training.ppo import (
-    MAX_LEARNING_RATE,
-    TrackingPPO,
-    _gaussian_kl,
-    _value_loss,
-)
+from omni_envs.training.learning_rate import MAX_LEARNING_RATE
+from omni_envs.training.ppo import TrackingPPO, _gaussian_kl, _value_loss
 from omni_envs.training.sb3_vec_env import SB3VecEnv
 
 SMALL = PPOConfig(rollout_steps=16, epochs=4, minibatches=2, hidden=(32, 32), gamma=0.9)

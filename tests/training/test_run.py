@@ -9,8 +9,9 @@ import time
 import numpy as np
 import pytest
 
-pytest.importorskip("stable_baselines3")
+pytest.importorskip("tensorboard")
 import torch
+from gymnasium.vector import AutoresetMode
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint, checkpoints
@@ -18,12 +19,30 @@ from omni_envs.training.config import PPOConfig, TrainConfig
 from omni_envs.training.run import train
 
 ROLLOUT = 8 * 16
+MODES = {"sb3": AutoresetMode.SAME_STEP, "torchrl": AutoresetMode.DISABLED}
+PACKAGES = {"sb3": "stable_baselines3", "torchrl": "torchrl"}
 
 
-def _config(out, steps: int = 4 * ROLLOUT, **changes) -> TrainConfig:
-    ppo = PPOConfig(rollout_steps=8, epochs=2, minibatches=2, hidden=(16,))
-    fields = {"env": "Chase", "out": out, "steps": steps, "num_envs": 16, "ppo": ppo}
-    return TrainConfig(**{**fields, **changes})
+@pytest.fixture(params=MODES)
+def trainer(request) -> str:
+    """Every trainer makes the same run directory, and resumes alike."""
+    pytest.importorskip(PACKAGES[request.param])
+    return request.param
+
+
+@pytest.fixture
+def config(trainer):
+    def make(out, steps: int = 4 * ROLLOUT, **changes) -> TrainConfig:
+        ppo = PPOConfig(rollout_steps=8, epochs=2, minibatches=2, hidden=(16,))
+        fields = {"env": "Chase", "out": out, "steps": steps, "num_envs": 16, "ppo": ppo}
+        return TrainConfig(**{**fields, "trainer": trainer, **changes})
+
+    return make
+
+
+@pytest.fixture
+def env(chase, trainer):
+    return lambda: chase(16, True, MODES[trainer])
 
 
 def _policy(out):
@@ -34,10 +53,10 @@ def _same(one, two) -> bool:
     return all(torch.equal(one[key], two[key]) for key in one)
 
 
-def test_a_run_directory_holds_what_it_should(chase, tmp_path):
-    result = train(_config(tmp_path, checkpoint_every=2), env=chase(16))
+def test_a_run_directory_holds_what_it_should(config, env, tmp_path):
+    result = train(config(tmp_path, checkpoint_every=2), env=env())
     assert result.steps == 4 * ROLLOUT and len(result.history) == 4
-    assert TrainConfig.load(tmp_path) == _config(tmp_path, checkpoint_every=2)
+    assert TrainConfig.load(tmp_path) == config(tmp_path, checkpoint_every=2)
     steps = [Checkpoint.load(p).steps for p in checkpoints(tmp_path)]
     assert steps == [0, 2 * ROLLOUT, 4 * ROLLOUT]
     assert any((tmp_path / "tensorboard").iterdir())
@@ -49,10 +68,10 @@ def test_a_run_directory_holds_what_it_should(chase, tmp_path):
     assert 0 < result.history[-1]["body_error_m"] < 1.5
 
 
-def test_a_resumed_run_goes_on_from_the_last_checkpoint(chase, tmp_path):
-    train(_config(tmp_path), env=chase(16))
+def test_a_resumed_run_goes_on_from_the_last_checkpoint(config, env, tmp_path):
+    train(config(tmp_path), env=env())
     first = _policy(tmp_path)
-    longer = train(_config(tmp_path, 6 * ROLLOUT), resume=True, env=chase(16))
+    longer = train(config(tmp_path, 6 * ROLLOUT), resume=True, env=env())
     assert longer.steps == 6 * ROLLOUT
     assert [row["steps"] for row in longer.history] == [k * ROLLOUT for k in range(1, 7)]
     seconds = [row["seconds"] for row in longer.history]
@@ -60,59 +79,59 @@ def test_a_resumed_run_goes_on_from_the_last_checkpoint(chase, tmp_path):
     assert not _same(first, _policy(tmp_path))
 
 
-def test_figures_go_on_where_they_were(chase, tmp_path):
+def test_figures_go_on_where_they_were(config, env, tmp_path):
     """Right after a restart only short episodes have finished: alone they would mislead."""
-    train(_config(tmp_path, 20 * ROLLOUT), env=chase(16))
-    longer = train(_config(tmp_path, 21 * ROLLOUT), resume=True, env=chase(16))
+    train(config(tmp_path, 20 * ROLLOUT), env=env())
+    longer = train(config(tmp_path, 21 * ROLLOUT), resume=True, env=env())
     before, after = (row["episode_length"] for row in longer.history[-2:])
     assert after == pytest.approx(before, rel=0.2)
     saved = Checkpoint.load(checkpoints(tmp_path)[-1]).episodes
     assert np.mean([length for _, length in saved]) == pytest.approx(after)
 
 
-def test_resuming_a_finished_run_changes_nothing(chase, tmp_path):
-    train(_config(tmp_path), env=chase(16))
+def test_resuming_a_finished_run_changes_nothing(config, env, tmp_path):
+    train(config(tmp_path), env=env())
     first = _policy(tmp_path)
-    again = train(_config(tmp_path), resume=True, env=chase(16))
+    again = train(config(tmp_path), resume=True, env=env())
     assert again.steps == 4 * ROLLOUT and _same(first, _policy(tmp_path))
 
 
-def test_resuming_twice_gives_the_same_weights(chase, tmp_path):
+def test_resuming_twice_gives_the_same_weights(config, env, tmp_path):
     policies = []
     for name in ("one", "two"):
-        train(_config(tmp_path / name), env=chase(16))
-        train(_config(tmp_path / name, 6 * ROLLOUT), resume=True, env=chase(16))
+        train(config(tmp_path / name), env=env())
+        train(config(tmp_path / name, 6 * ROLLOUT), resume=True, env=env())
         policies.append(_policy(tmp_path / name))
     assert _same(*policies)
 
 
-def test_time_limit_ends_the_run(chase, tmp_path):
-    result = train(_config(tmp_path, 10**9, time_limit=0.3), env=chase(16))
+def test_time_limit_ends_the_run(config, env, tmp_path):
+    result = train(config(tmp_path, 10**9, time_limit=0.3), env=env())
     assert 0.3 <= result.seconds < 3.0
     assert Checkpoint.load(checkpoints(tmp_path)[-1]).steps == result.steps
 
 
-def test_a_run_directory_in_use_is_not_overwritten(chase, tmp_path):
-    train(_config(tmp_path), env=chase(16))
+def test_a_run_directory_in_use_is_not_overwritten(config, env, tmp_path):
+    train(config(tmp_path), env=env())
     with pytest.raises(InvalidOptionError, match="already holds a training run"):
-        train(_config(tmp_path), env=chase(16))
+        train(config(tmp_path), env=env())
     with pytest.raises(InvalidOptionError, match="no checkpoint to resume"):
-        train(_config(tmp_path / "new"), resume=True, env=chase(16))
+        train(config(tmp_path / "new"), resume=True, env=env())
 
 
-def test_a_cut_checkpoint_is_one_clear_error(chase, tmp_path):
-    train(_config(tmp_path), env=chase(16))
+def test_a_cut_checkpoint_is_one_clear_error(config, env, tmp_path):
+    train(config(tmp_path), env=env())
     last = checkpoints(tmp_path)[-1]
     last.write_bytes(last.read_bytes()[:200])
     with pytest.raises(FileFormatError, match=last.name):
-        train(_config(tmp_path), resume=True, env=chase(16))
+        train(config(tmp_path), resume=True, env=env())
 
 
-def test_progress_is_lines_where_there_is_no_terminal(chase, tmp_path, capsys):
-    train(_config(tmp_path / "shown"), progress=True, env=chase(16))
+def test_progress_is_lines_where_there_is_no_terminal(config, env, tmp_path, capsys):
+    train(config(tmp_path / "shown"), progress=True, env=env())
     shown = capsys.readouterr().err
     assert "steps/s" in shown and "100%" in shown and "episode" in shown and "error" in shown
-    train(_config(tmp_path / "quiet"), progress=False, env=chase(16))
+    train(config(tmp_path / "quiet"), progress=False, env=env())
     assert capsys.readouterr().err == ""
 
 
@@ -120,17 +139,21 @@ TRAINEE = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from conftest import Chase
+from gymnasium.vector import AutoresetMode
 from pathlib import Path
 from omni_envs.training.config import PPOConfig, TrainConfig
 from omni_envs.training.run import train
 ppo = PPOConfig(rollout_steps=8, epochs=2, minibatches=2, hidden=(16,))
-config = TrainConfig("Chase", Path(sys.argv[1]), 10**9, num_envs=16, checkpoint_every=1, ppo=ppo)
-train(config, env=Chase(16))
+config = TrainConfig(
+    "Chase", Path(sys.argv[1]), 10**9, sys.argv[3], num_envs=16, checkpoint_every=1, ppo=ppo
+)
+train(config, env=Chase(16, True, AutoresetMode[sys.argv[4]]))
 """
 
 
-def test_a_killed_run_resumes(chase, tmp_path):
-    command = [sys.executable, "-c", TRAINEE, str(tmp_path), os.path.dirname(__file__)]
+def test_a_killed_run_resumes(trainer, env, tmp_path):
+    folder, mode = os.path.dirname(__file__), MODES[trainer].name
+    command = [sys.executable, "-c", TRAINEE, str(tmp_path), folder, trainer, mode]
     trainee = subprocess.Popen(command)
     try:
         deadline = time.monotonic() + 60
@@ -142,6 +165,6 @@ def test_a_killed_run_resumes(chase, tmp_path):
         trainee.wait()
     reached = Checkpoint.load(checkpoints(tmp_path)[-1])
     config = dataclasses.replace(TrainConfig.load(tmp_path), steps=reached.steps + 2 * ROLLOUT)
-    result = train(config, resume=True, env=chase(16))
+    result = train(config, resume=True, env=env())
     assert result.steps == reached.steps + 2 * ROLLOUT
     assert repr(list(result.history[:-2])) == repr(reached.history)  # NaN is not equal to itself

@@ -1,0 +1,159 @@
+"""PPO on tensordicts, with TorchRL's own parts: the recipe of ``TrackingPPO``.
+
+Where a part of TorchRL does what the recipe says it is used: ``GAE`` bootstraps what was truncated
+and normalises advantages over the rollout, ``ClipPPOLoss`` has the clipped surrogate, the entropy
+bonus and the larger of the clipped and the plain value loss. Where none does, it is written out
+here: the learning rate follows the exact KL divergence of the Gaussians (TorchRL's
+``kl_approx`` is an estimate from samples, which is noisy and can be negative), and the observation
+statistics are those of the network (``VecNormV2`` would hold them in the environment, where every
+collector has its own and the exported policy none) and are fed after the update, so that a
+rollout and its update see the same network.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from omni_envs.errors import MissingDependencyError, OmniEnvsError
+
+try:
+    import torch
+    from tensordict import TensorDictBase
+    from torch import nn
+    from torch.distributions import kl_divergence
+    from torchrl.modules import IndependentNormal, ProbabilisticActor, ValueOperator
+    from torchrl.objectives import ClipPPOLoss
+    from torchrl.objectives.value import GAE
+except ImportError as error:
+    raise MissingDependencyError("torchrl", "torchrl", "Training with TorchRL") from error
+
+from omni_envs.training.config import PPOConfig
+from omni_envs.training.learning_rate import adapted_learning_rate
+from omni_envs.training.torchrl_network import TrackingNetwork
+
+
+class TensorDictPPO:
+    """PPO for batches of any collector.
+
+    Args:
+        network: The weights.
+        actor: Policy that collected, on these weights.
+        critic: Value operator on these weights.
+        config: Hyper-parameters.
+
+    Attributes:
+        network: The weights.
+        optimizer: Adam.
+        learning_rate: Learning rate of the next gradient step.
+        updates: Passes over a rollout so far.
+    """
+
+    def __init__(
+        self,
+        network: TrackingNetwork,
+        actor: ProbabilisticActor,
+        critic: ValueOperator,
+        config: PPOConfig | None = None,
+    ) -> None:
+        self.config = config = config or PPOConfig()
+        self.network, self.actor, self.critic = network, actor, critic
+        self.learning_rate, self.updates = config.learning_rate, 0
+        self.optimizer = torch.optim.Adam(network.parameters(), lr=config.learning_rate, fused=True)
+        self.advantages = GAE(
+            gamma=config.gamma,
+            lmbda=config.gae_lambda,
+            value_network=critic,
+            average_gae=True,
+            deactivate_vmap=True,
+        )
+        self.loss = ClipPPOLoss(
+            actor,
+            critic,
+            clip_epsilon=config.clip,
+            entropy_coeff=config.entropy_weight,
+            critic_coeff=1.0,
+            loss_critic_type="l2",
+            clip_value=config.value_clip or None,
+            log_explained_variance=False,
+            functional=False,
+        )
+
+    def learn(self, rollout: TensorDictBase) -> dict[str, float]:
+        """Updates the network from a rollout (N, T), the very first one only its normalisers.
+
+        Args:
+            rollout: What a collector with this actor yields; time is the last dimension.
+
+        Returns:
+            Means over the gradient steps: ``kl``, ``surrogate_loss``, ``value_loss``, ``entropy``,
+            ``clip_fraction``; ``learning_rate`` and ``action_std`` at the end. Empty if there was
+            no update.
+
+        Raises:
+            OmniEnvsError: The loss is not finite any more.
+        """
+        normalizers = self.network.mlp_extractor
+        figures: dict[str, float] = {}
+        if int(normalizers.actor_normalizer.count) > 0:
+            with torch.no_grad():
+                self.advantages(rollout)
+            figures = self.update(rollout.exclude("next").transpose(0, 1).flatten())
+        seen, privileged = self.actor.in_keys[0], self.critic.in_keys[0]
+        normalizers.actor_normalizer.update(rollout[seen].flatten(0, -2))
+        normalizers.critic_normalizer.update(rollout[privileged].flatten(0, -2))
+        return figures
+
+    def update(self, samples: TensorDictBase) -> dict[str, float]:
+        """Takes the gradient steps of a rollout; see ``learn``.
+
+        Args:
+            samples: (B,) observations, ``action``, ``action_log_prob``, ``loc``, ``scale``,
+                ``state_value``, ``value_target`` and ``advantage``.
+        """
+        config, totals = self.config, Counter[str]()
+        for _ in range(config.epochs):
+            for index in torch.randperm(len(samples)).tensor_split(config.minibatches):
+                batch = samples[index]
+                self.optimizer.zero_grad()
+                figures = self.backward(batch)
+                if not all(map(math.isfinite, figures.values())):
+                    raise OmniEnvsError(
+                        f"Training diverged after {self.updates} passes: {figures}. "
+                        "Resume from a checkpoint with a smaller learning rate."
+                    )
+                self.set_learning_rate(
+                    adapted_learning_rate(self.learning_rate, figures["kl"], config.desired_kl)
+                )
+                nn.utils.clip_grad_norm_(self.network.parameters(), config.max_grad_norm)
+                self.optimizer.step()
+                totals.update(figures)
+            self.updates += 1
+        steps = config.epochs * config.minibatches
+        return {
+            **{name: total / steps for name, total in totals.items()},
+            "learning_rate": self.learning_rate,
+            "action_std": self.network.log_std.exp().mean().item(),
+        }
+
+    def backward(self, batch: TensorDictBase) -> dict[str, float]:
+        """Adds the gradient of the loss over a mini-batch; returns the figures to log."""
+        losses = self.loss(batch)
+        value = self.config.value_weight * losses["loss_critic"]
+        (losses["loss_objective"] + losses["loss_entropy"] + value).backward()
+        with torch.no_grad():
+            acted = IndependentNormal(batch["loc"], batch["scale"])
+            kl = kl_divergence(acted.base_dist, self.actor.get_dist(batch).base_dist)
+        return {
+            "kl": kl.sum(dim=-1).mean().item(),
+            "surrogate_loss": losses["loss_objective"].item(),
+            "value_loss": losses["loss_critic"].item(),
+            "entropy": losses["entropy"].item(),
+            "clip_fraction": losses["clip_fraction"].item(),
+        }
+
+    def set_learning_rate(self, rate: float) -> None:
+        """Sets the learning rate of the next gradient step."""
+        self.learning_rate = rate
+        for group in self.optimizer.param_groups:
+            group["lr"] = rate
