@@ -18,6 +18,9 @@ from omni_envs.progress import progress_bar
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.recipes import RECIPES
 
+PACKAGES = {"sb3": ("stable_baselines3", "SB3"), "torchrl": ("torchrl", "TorchRL")}
+"""Trainer, which is its extra too, to package and title."""
+
 
 @dataclass
 class Arguments:
@@ -99,13 +102,13 @@ def make_config(arguments: Arguments) -> TrainConfig:
 
 def run(arguments: Arguments) -> dict[str, Any]:
     """Trains, evaluates and exports; returns the figures."""
-    _check_packages()
+    config = make_config(arguments)
+    _check_packages(config.trainer)
     from omni_envs.export import export_run
     from omni_envs.training.curve import plot_curve
     from omni_envs.training.evaluate import evaluate_run
     from omni_envs.training.run import train
 
-    config = make_config(arguments)
     result = train(config, resume=arguments.resume, progress=not arguments.json)
     plot_curve(config.out, result.history, result.control_dt)
     with progress_bar("Evaluating", unit="episodes", disable=arguments.json) as progress:
@@ -125,11 +128,12 @@ def _mapping(flag: str, text: str) -> dict[str, Any]:
     return data
 
 
-def _check_packages() -> None:
+def _check_packages(trainer: str) -> None:
     """Fails before the training, not after it."""
+    library, title = PACKAGES[trainer]
     for package, extra, purpose in (
-        ("stable_baselines3", "sb3", "Training with SB3"),
-        ("tensorboard", "sb3", "The TensorBoard log"),
+        (library, trainer, f"Training with {title}"),
+        ("tensorboard", trainer, "The TensorBoard log"),
         ("onnx", "export", "Exporting a policy"),
         ("onnxruntime", "export", "Checking an exported policy"),
         ("matplotlib", "viewer", "Drawing the learning curve"),
