@@ -100,7 +100,7 @@ def test_view_writes_pictures(retargeted, tmp_path, capsys):
         (["retarget", "box_carry", "box_carry", "--out", "folder"], "overwrite"),
         (["retarget", "absent.pt", "--out", "r.npz"], "absent.pt"),
         (["evaluate", "absent.npz"], "absent.npz"),
-        (["view", "absent.npz"], "--strip"),
+        (["view", "absent.npz"], "absent.npz"),
         (["export", "absent_run"], "absent_run"),
     ],
 )
