@@ -111,8 +111,8 @@ class TensorDictPPO:
             samples: (B,) observations, ``action``, ``action_log_prob``, ``loc``, ``scale``,
                 ``state_value``, ``value_target`` and ``advantage``.
         """
-        config, totals = self.config, Counter[str]()
-        for _ in range(config.epochs):
+        config, totals, last = self.config, Counter[str](), 0.0
+        for epoch in range(config.epochs):
             for index in torch.randperm(len(samples)).tensor_split(config.minibatches):
                 batch = samples[index]
                 self.optimizer.zero_grad()
@@ -122,13 +122,16 @@ class TensorDictPPO:
                         f"Training diverged after {self.updates} passes: {figures}. "
                         "Resume from a checkpoint with a smaller learning rate."
                     )
-                self.set_learning_rate(
-                    adapted_learning_rate(self.learning_rate, figures["kl"], config.desired_kl)
-                )
+                if config.adapt_every == "minibatch":
+                    self.adapt_learning_rate(figures["kl"])
                 nn.utils.clip_grad_norm_(self.network.parameters(), config.max_grad_norm)
                 self.optimizer.step()
                 totals.update(figures)
+                if epoch == config.epochs - 1:
+                    last += figures["kl"] / config.minibatches
             self.updates += 1
+        if config.adapt_every == "update":
+            self.adapt_learning_rate(last)
         steps = config.epochs * config.minibatches
         return {
             **{name: total / steps for name, total in totals.items()},
@@ -152,8 +155,9 @@ class TensorDictPPO:
             "clip_fraction": losses["clip_fraction"].item(),
         }
 
-    def set_learning_rate(self, rate: float) -> None:
-        """Sets the learning rate of the next gradient step."""
+    def adapt_learning_rate(self, kl: float) -> None:
+        """Has the learning rate of the next gradient step follow the divergence."""
+        rate = adapted_learning_rate(self.learning_rate, kl, self.config.desired_kl)
         self.learning_rate = rate
         for group in self.optimizer.param_groups:
             group["lr"] = rate

@@ -30,7 +30,13 @@ def _rollouts(ppo: TensorDictPPO, chase, count: int, seed: int = 0):
     env = make_torchrl_env(chase(NUM_ENVS, True, AutoresetMode.DISABLED))
     env.set_seed(seed)
     frames = ppo.config.rollout_steps * NUM_ENVS
-    collector = Collector(env, ppo.actor, frames_per_batch=frames, total_frames=count * frames)
+    collector = Collector(
+        env,
+        ppo.actor,
+        frames_per_batch=frames,
+        total_frames=count * frames,
+        auto_register_policy_transforms=False,
+    )
     yield from collector
     collector.shutdown()
 
@@ -130,7 +136,13 @@ def test_a_shared_observation_works_too(chase):
     network = TrackingNetwork(2, 2, torch.full((2,), -2.0), torch.full((2,), 2.0), (8,))
     ppo = TensorDictPPO(network, *actor_and_critic(network, ["observation"]), SMALL)
     env = make_torchrl_env(chase(4, False, AutoresetMode.DISABLED))
-    collector = Collector(env, ppo.actor, frames_per_batch=64, total_frames=128)
+    collector = Collector(
+        env,
+        ppo.actor,
+        frames_per_batch=64,
+        total_frames=128,
+        auto_register_policy_transforms=False,
+    )
     figures = [ppo.learn(rollout) for rollout in collector]
     collector.shutdown()
     assert figures[1]["kl"] > 0

@@ -1,6 +1,7 @@
 """Both trainers do the same arithmetic: one recipe, written twice."""
 
 from copy import deepcopy
+from dataclasses import fields
 
 import pytest
 from gymnasium.vector import AutoresetMode
@@ -79,7 +80,7 @@ def test_same_rollout_same_gradient_steps(chase):
     learner = _trained(chase)
     ppo, rollout = _torchrl(learner.policy.state_dict()), learner._rollout()
     ppo.optimizer.load_state_dict(deepcopy(learner.policy.optimizer.state_dict()))
-    ppo.set_learning_rate(learner.current_learning_rate)
+    ppo.learning_rate = learner.current_learning_rate
     torch.manual_seed(1)
     learner._update(rollout)
     torch.manual_seed(1)
@@ -88,8 +89,9 @@ def test_same_rollout_same_gradient_steps(chase):
     _assert_same_weights(ppo, learner, 1e-5)
 
 
-def test_the_learning_rate_takes_the_same_way(chase):
-    config = PPOConfig(**{**vars(CONFIG), "desired_kl": 0.001})
+@pytest.mark.parametrize("adapt_every", ["minibatch", "update"])
+def test_the_learning_rate_takes_the_same_way(chase, adapt_every):
+    config = PPOConfig(**{**vars(CONFIG), "desired_kl": 0.001, "adapt_every": adapt_every})
     learner = _sb3(chase, config)
     learner.learn(16 * NUM_ENVS)  # the first rollout only feeds the normalisers
     ppo, rollout = _torchrl(learner.policy.state_dict(), config), learner._rollout()
@@ -105,8 +107,35 @@ def test_the_learning_rate_takes_the_same_way(chase):
     assert rates["torchrl"] == rates["sb3"]
 
 
-def test_same_chance_same_training(chase):
+OTHER = PPOConfig(
+    rollout_steps=12,
+    epochs=2,
+    minibatches=3,
+    learning_rate=3e-4,
+    desired_kl=0.02,
+    adapt_every="update",
+    gamma=0.8,
+    gae_lambda=0.9,
+    clip=0.1,
+    value_clip=0.0,
+    value_weight=0.5,
+    entropy_weight=0.02,
+    max_grad_norm=0.1,
+    hidden=(24,),
+    initial_std=0.3,
+)
+"""Another value of every hyper-parameter: one that a trainer does not heed shows."""
+
+
+def test_every_hyper_parameter_is_another():
+    same = [f.name for f in fields(PPOConfig) if getattr(OTHER, f.name) == f.default]
+    assert not same
+
+
+@pytest.mark.parametrize("config", [CONFIG, OTHER], ids=["usual", "other"])
+def test_same_chance_same_training(chase, config):
     """With the same random numbers both collect, bootstrap and learn the same."""
+    updates, frames = 5, config.rollout_steps * NUM_ENVS
 
     class Patient(chase):
         """Stays in the start that a seed gave until it is told to start anew."""
@@ -116,16 +145,21 @@ def test_same_chance_same_training(chase):
                 return self._observe(), {}
             return super().reset(seed=seed, options=options)
 
-    learner = _sb3(chase)
-    ppo = _torchrl(learner.policy.state_dict())
+    learner = _sb3(chase, config)
+    ppo = _torchrl(learner.policy.state_dict(), config)
     learner.env.seed(5)
     torch.manual_seed(2)
-    learner.learn(5 * 16 * NUM_ENVS)
+    learner.learn(updates * frames)
 
     env = make_torchrl_env(Patient(NUM_ENVS, True, AutoresetMode.DISABLED))
     env.set_seed(5)
-    frames = 16 * NUM_ENVS
-    collector = Collector(env, ppo.actor, frames_per_batch=frames, total_frames=5 * frames)
+    collector = Collector(
+        env,
+        ppo.actor,
+        frames_per_batch=frames,
+        total_frames=updates * frames,
+        auto_register_policy_transforms=False,
+    )
     torch.manual_seed(2)
     figures = [ppo.learn(rollout) for rollout in collector]
     collector.shutdown()
