@@ -33,7 +33,7 @@ def level_floor(positions: np.ndarray, toes: np.ndarray, fps: float) -> np.ndarr
     points = toes[frame, foot]
     centred = points - np.array([points[foot == f].mean(axis=0) for f in range(2)])[foot]
     directions, spread, _ = np.linalg.svd(centred[:, :2].T, full_matrices=False)
-    levelled = positions.copy()
+    levelled = np.array(positions)
     for direction, size in zip(directions.T, spread / np.sqrt(len(points)), strict=True):
         along = centred[:, :2] @ direction
         slope = along @ centred[:, 2] / (along @ along) if size > 0 else 0.0

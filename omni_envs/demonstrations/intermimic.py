@@ -15,6 +15,7 @@ import numpy as np
 
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.skeleton import SMPLH
+from omni_envs.demonstrations.source_options import SourceOptions
 from omni_envs.errors import FileFormatError, MissingDependencyError
 from omni_envs.scenes import Box, Part, Scene, SceneObject, load_convex_parts
 
@@ -42,23 +43,29 @@ It is a cardboard box of 0.335 × 0.338 × 0.360 m that lies askew in its own fr
 
 
 def load_intermimic(
-    path: str | Path, *, object_mesh: str | Path | None = None, height: float | None = None
+    path: str | Path,
+    options: SourceOptions | None = None,
+    *,
+    object_mesh: str | Path | None = None,
 ) -> Demonstration:
     """Loads an InterMimic file.
 
     Args:
         path: File named ``sub<n>_<object>_<clip>.pt``.
+        options: Height (None looks it up by the subject in the file name) and the part to take.
         object_mesh: Mesh of the object. None looks for ``<object>.obj`` beside the file, then for
             an object known by name (``largebox``).
-        height: Standing height of the person, m. None looks it up by the subject in the file name.
 
     Raises:
         FileFormatError: The file is missing, damaged, carries pickled code, has another layout or
             values that are not finite, or the object or the height cannot be found.
         MissingDependencyError: PyTorch is not installed.
     """
+    options = SourceOptions() if options is None else options
     path = Path(path)
     data = _read(path)
+    data = data[options.rows(path, len(data), FPS)]
+    height = options.height
     match = re.fullmatch(r"(sub\d+)_(.+?)(?:_\d+)?", path.stem)
     subject, name = match.groups() if match else ("", "")
     if height is None:

@@ -124,7 +124,8 @@ MOCAP = Skeleton(
         *_mocap_leg("Right"),
         *("LeftFootMod", "RightFootMod"),
     ),
-    # Spine1 coincides with Hips in these files; the hand is the middle fingertip.
+    # OmniRetarget's choice, kept so that results compare: Spine1, 0.3 m above Hips, leads the
+    # pelvis; the hand is the middle fingertip.
     keypoint_joints=_keypoints(
         "Spine1",
         hip="{Left}UpLeg",
@@ -138,26 +139,3 @@ MOCAP = Skeleton(
     contact_joints=_mocap_contacts({s: _mocap_arm(s)[3:] for s in ("Left", "Right")}),
 )
 """The 53 joints of the climbing mocap arrays (T, 53, 3)."""
-
-ACCAD = Skeleton(
-    name="ACCAD",
-    joint_names=(
-        *("Hips", "ToSpine", "Spine", "Spine1", "Neck", "Head", "HeadEnd"),
-        *(*_mocap_arm("Left")[:4], "LeftHandEnd"),
-        *(*_mocap_arm("Right")[:4], "RightHandEnd"),
-        *(*_mocap_leg("Left"), "LeftToeBaseEnd"),
-        *(*_mocap_leg("Right"), "RightToeBaseEnd"),
-    ),
-    keypoint_joints=_keypoints(
-        "Hips",
-        hip="{Left}UpLeg",
-        knee="{Left}Leg",
-        ankle="{Left}Foot",
-        toe="{Left}ToeBase",
-        shoulder="{Left}Arm",
-        elbow="{Left}ForeArm",
-        hand="{Left}Hand",
-    ),
-    contact_joints=_mocap_contacts({s: (f"{s}Hand", f"{s}HandEnd") for s in ("Left", "Right")}),
-)
-"""The 22 joints of ACCAD BVH files and their 5 end sites."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from omni_envs.demonstrations import SMPLH, closest_points, load_intermimic
+from omni_envs.demonstrations import SMPLH, SourceOptions, closest_points, load_intermimic
 from omni_envs.demonstrations.intermimic import LARGEBOX
 from omni_envs.errors import FileFormatError
 from omni_envs.scenes import Box
@@ -122,7 +122,7 @@ def test_unknown_subject_needs_a_height(tmp_path, intermimic_array):
     path = write(tmp_path, intermimic_array, "sub99_largebox_001.pt")
     with pytest.raises(FileFormatError, match="height="):
         load_intermimic(path)
-    assert load_intermimic(path, height=1.7).height == 1.7
+    assert load_intermimic(path, SourceOptions(height=1.7)).height == 1.7
 
 
 def test_unknown_object_is_an_error(tmp_path, intermimic_array):

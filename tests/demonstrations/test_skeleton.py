@@ -1,12 +1,12 @@
 import pytest
 
 from omni_envs.demonstrations import MOCAP, SMPLH
-from omni_envs.demonstrations.skeleton import ACCAD, Skeleton
+from omni_envs.demonstrations.skeleton import Skeleton
 from omni_envs.errors import InvalidDataError
 from omni_envs.robots import CONTACT_LINKS, KEYPOINTS
 
 
-@pytest.mark.parametrize(("skeleton", "joints"), [(SMPLH, 52), (MOCAP, 53), (ACCAD, 27)])
+@pytest.mark.parametrize(("skeleton", "joints"), [(SMPLH, 52), (MOCAP, 53)])
 def test_skeletons_name_every_keypoint_and_link_once(skeleton, joints):
     assert skeleton.num_joints == len(set(skeleton.joint_names)) == joints
     assert set(skeleton.keypoint_joints) == set(KEYPOINTS)
