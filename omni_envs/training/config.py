@@ -26,6 +26,8 @@ class PPOConfig:
         epochs: Passes over a rollout.
         minibatches: Gradient steps per pass.
         learning_rate: Initial learning rate of Adam.
+        critic_learning_rate: Constant learning rate of the critic; 0 gives it the actor's. With
+            small rollouts the divergence asks for an actor so slow that the critic lags behind.
         desired_kl: The learning rate is divided by 1.5 where an update moves the policy by more
             than twice this KL divergence, multiplied where by less than half; 0 keeps it constant.
         adapt_every: How often that happens: after every ``"minibatch"`` (rsl_rl), or every
@@ -47,6 +49,7 @@ class PPOConfig:
     epochs: int = 5
     minibatches: int = 4
     learning_rate: float = 1e-3
+    critic_learning_rate: float = 0.0
     desired_kl: float = 0.01
     adapt_every: Literal["minibatch", "update"] = "minibatch"
     gamma: float = 0.99

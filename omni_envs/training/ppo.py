@@ -112,6 +112,8 @@ class TrackingPPO(PPO):
             device="cpu",
             stats_window_size=max(100, env.num_envs),
         )
+        if config.critic_learning_rate:
+            self._split_optimizer(config.critic_learning_rate)
         self.set_logger(Logger(None, []))
         self.current_learning_rate = config.learning_rate
         self.figures: dict[str, float] = {}
@@ -223,8 +225,16 @@ class TrackingPPO(PPO):
     def _adapt_learning_rate(self, kl: float) -> None:
         rate = adapted_learning_rate(self.current_learning_rate, kl, self.config.desired_kl)
         self.current_learning_rate = rate
-        for group in self.policy.optimizer.param_groups:
-            group["lr"] = rate
+        # A second group is the critic's, whose rate is constant.
+        self.policy.optimizer.param_groups[0]["lr"] = rate
+
+    def _split_optimizer(self, critic_rate: float) -> None:
+        policy = self.policy
+        critic = [*policy.mlp_extractor.critic.parameters(), *policy.value_net.parameters()]
+        group = policy.optimizer.param_groups[0]
+        members = {id(p) for p in critic}
+        group["params"] = [p for p in group["params"] if id(p) not in members]
+        policy.optimizer.add_param_group({"params": critic, "lr": critic_rate})
 
 
 def _take(value: Any, index: Tensor) -> Any:

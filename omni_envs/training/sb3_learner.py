@@ -34,7 +34,7 @@ class SB3Learner:
 
     def __init__(self, config: TrainConfig, env: VectorEnv) -> None:
         adapter = SB3VecEnv(env)
-        self._seed = config.seed
+        self._seed, self._env = config.seed, env
         self._ppo = TrackingPPO(VecMonitor(adapter), config.ppo, seed=config.seed)
         self._errors = _TrackingError(adapter)
 
@@ -56,6 +56,7 @@ class SB3Learner:
             "episode_length": mean("l"),
             "episode_return": mean("r"),
             "body_error_m": self._errors.mean,
+            "noise_level": float(getattr(self._env.unwrapped, "noise_level", 1.0)),
             **ppo.figures,
         }
 

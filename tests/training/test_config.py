@@ -24,6 +24,7 @@ def test_defaults_are_the_published_ones():
         "epochs": 5,
         "minibatches": 4,
         "learning_rate": 1e-3,
+        "critic_learning_rate": 0.0,
         "desired_kl": 0.01,
         "adapt_every": "minibatch",
         "gamma": 0.99,

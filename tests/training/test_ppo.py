@@ -119,6 +119,21 @@ def test_learning_rate_is_adapted_as_often_as_asked(chase, monkeypatch, every, c
         assert seen[0] > learner.figures["kl"] > 0
 
 
+def test_the_critic_may_have_a_learning_rate_of_its_own(chase):
+    learner = _learner(chase, replace(SMALL, critic_learning_rate=2e-3))
+    actor, critic = learner.policy.optimizer.param_groups
+    assert len(actor["params"]) + len(critic["params"]) == len(list(learner.policy.parameters()))
+    learner.learn(1)
+    before = {k: v.clone() for k, v in learner.policy.named_parameters()}
+    learner._adapt_learning_rate(1.0)
+    assert (actor["lr"], critic["lr"]) == (learner.current_learning_rate, 2e-3)
+    learner.config = replace(learner.config, desired_kl=0.0)  # keeps the rates as they are
+    actor["lr"] = learner.current_learning_rate = 0.0
+    learner.learn(1, reset_num_timesteps=False)
+    moved = {k for k, v in learner.policy.named_parameters() if not torch.equal(v, before[k])}
+    assert moved and all("critic" in k or "value_net" in k for k in moved)
+
+
 def test_learning_rate_stays_within_its_limits(chase):
     learner = _learner(chase)
     for _ in range(50):
