@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from omni_envs.demonstrations import SMPLH, Demonstration
+from omni_envs.demonstrations.namings import SMPL_BODY
 from omni_envs.scenes import Box, Part, Scene, SceneObject
 
 
@@ -231,3 +232,83 @@ def write_bvh(tmp_path):
         return path
 
     return write
+
+
+def _smpl_body():
+    """Rest joints (52, 3), y up, and parents of a synthetic SMPL-H body like ``Person``."""
+    place = {}
+    for name, parent, offset in _TREE:
+        place[name] = np.add(place[parent] if parent else np.zeros(3), offset)
+    ours = {
+        "Pelvis": "Hips", "Spine1": "Spine", "Spine2": "Spine1", "Spine3": "Spine2",
+        "Neck": "Neck", "Head": "Head",
+    }  # fmt: skip
+    for side, s in (("Left", "L"), ("Right", "R")):
+        for smpl, name in (
+            ("Hip", "UpLeg"), ("Knee", "Leg"), ("Ankle", "Foot"), ("Foot", "Toe"),
+            ("Collar", "Shoulder"), ("Shoulder", "Arm"), ("Elbow", "ForeArm"), ("Wrist", "Hand"),
+        ):  # fmt: skip
+            ours[f"{s}_{smpl}"] = side + name
+    parents = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
+    rest = [place[ours[name]] for name in SMPL_BODY]
+    for wrist, sign in ((20, 1.0), (21, -1.0)):
+        for finger in range(5):
+            for bone in range(3):
+                parents.append(wrist if bone == 0 else len(rest) - 1)
+                rest.append(rest[wrist] + [sign * (0.08 + 0.02 * bone), 0.0, 0.01 * finger])
+    return np.array(rest), parents
+
+
+@pytest.fixture
+def write_body():
+    """Writes a synthetic body model: ``write_body(path, **changed_arrays)``.
+
+    Two vertices per joint, whose middle is the joint; the first shape parameter makes everything
+    10 % larger per unit.
+    """
+    rest, parents = _smpl_body()
+
+    def write(path, **changed):
+        away = np.array([[0.0, 0.03, 0.0]])
+        template = np.concatenate([rest + away, rest - away])
+        directions = np.zeros((*template.shape, 16))
+        directions[..., 0] = 0.1 * template
+        regressor = np.hstack([0.5 * np.eye(len(rest))] * 2)
+        root = np.uint32(2**32 - 1)
+        table = np.array([[root, *parents[1:]], range(len(rest))], dtype=np.uint32)
+        arrays = {
+            "v_template": template,
+            "shapedirs": directions,
+            "J_regressor": regressor,
+            "kintree_table": table,
+            "f": np.zeros((4, 3), np.uint32),
+            **changed,
+        }
+        path.parent.mkdir(parents=True, exist_ok=True)
+        np.savez(path, **{name: a for name, a in arrays.items() if a is not None})
+        return path
+
+    return write
+
+
+@pytest.fixture
+def smpl_parameters():
+    """Arrays of an AMASS file in which ``Person`` moves: z up, 52 joints."""
+
+    def make(person):
+        rest, _ = _smpl_body()
+        turned = Rotation.from_euler("x", 90, degrees=True)
+        poses = np.zeros((person.frames, 52, 3))
+        poses[:, 0] = turned.as_rotvec()
+        for joint, name in ((1, "LeftUpLeg"), (4, "LeftLeg"), (16, "LeftArm"), (17, "RightArm")):
+            poses[:, joint] = person.local[name].as_rotvec()
+        return {
+            "trans": turned.apply(person.root) - rest[0],
+            "poses": poses.reshape(person.frames, -1),
+            "betas": np.zeros(16),
+            "gender": np.array("neutral"),
+            "mocap_framerate": np.array(person.fps),
+            "dmpls": np.zeros((person.frames, 8)),
+        }
+
+    return make
