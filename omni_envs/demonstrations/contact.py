@@ -1,9 +1,9 @@
 """Where the person touches the object, the terrain or the ground.
 
 A link touches on a frame when the source says so (contact flags), else when one of its contact
-joints comes within 2 cm of the surface (a joint inside counts too). Objects are judged at human
-scale, where hands and object were recorded together; terrain at robot scale, where the robot meets
-it.
+joints comes within 2 cm of the surface (a joint inside counts too). What it touches is the middle
+of the patch below all of its joints that touch. Objects are judged at human scale, where hands and
+object were recorded together; terrain at robot scale, where the robot meets it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from omni_envs.demonstrations.demonstration import Demonstration
-from omni_envs.demonstrations.surface import closest_points
+from omni_envs.demonstrations.surface import closest_points, exposed_points
 from omni_envs.rotations import conjugate, rotate
 from omni_envs.scenes import Terrain
 
@@ -23,7 +23,10 @@ DISTANCE = 0.02
 KNEE_RADIUS = 0.04
 """A knee joint lies inside the knee, about this deep under the skin at human scale, m."""
 
-_Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+_BEFORE = {"hand": "elbow", "knee": "hip", "foot": "knee"}
+"""The keypoint that each kind of link hangs on."""
+
+_Projection = Callable[[str, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _Contacts = tuple[dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
@@ -32,7 +35,7 @@ def object_contacts(demonstration: Demonstration) -> _Contacts:
     assert demonstration.scene.object is not None and demonstration.object_poses is not None
     parts, poses = demonstration.scene.object.parts, demonstration.object_poses[:, None]
     positions = rotate(conjugate(poses[..., 3:]), demonstration.positions - poses[..., :3])
-    return _contacts(demonstration, positions, lambda link, p: closest_points(parts, p), 1.0)
+    return _contacts(demonstration, positions, lambda link, p, eyes: closest_points(parts, p), 1.0)
 
 
 def terrain_contacts(
@@ -54,16 +57,12 @@ def terrain_contacts(
     parts = terrain.parts if terrain is not None else ()
     uneven = terrain.heightfield if terrain is not None else None
 
-    def project(link: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        closest, distance = closest_points(parts, points)
+    def project(link: str, points: np.ndarray, eyes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        closest, distance = exposed_points(parts, points, not link.endswith("foot"), eyes)
         if uneven is not None:
             found, gap = uneven.closest_points(points)
             closest = np.where((gap < distance)[:, None], found, closest)
             distance = np.minimum(distance, gap)
-        if not link.endswith("foot"):
-            ground = points[:, 2] < distance
-            closest[ground] = points[ground] * (1.0, 1.0, 0.0)
-            distance = np.minimum(distance, points[:, 2])
         return closest, distance
 
     return _contacts(demonstration, positions, project, scale)
@@ -72,7 +71,7 @@ def terrain_contacts(
 def _contacts(
     demonstration: Demonstration,
     positions: np.ndarray,
-    project: Callable[[str, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    project: _Projection,
     scale: float,
 ) -> _Contacts:
     names, frames = demonstration.joint_names, demonstration.num_frames
@@ -86,13 +85,28 @@ def _contacts(
             part = link.replace("foot", "toe")
             joints = (demonstration.keypoint_joints[part],)
         points = positions[:, [names.index(j) for j in joints]]
-        closest, distance = project(link, points.reshape(-1, 3))
+        side, kind = link.split("_")
+        before = demonstration.keypoint_joints[f"{side}_{_BEFORE[kind]}"]
+        eyes = positions[:, names.index(before)]
+        each = np.repeat(eyes, len(joints), axis=0)
+        closest, distance = project(link, points.reshape(-1, 3), each)
         distance = distance.reshape(frames, -1)
-        nearest = np.argmin(distance, axis=1)
-        rows = np.arange(frames)
         depth = KNEE_RADIUS * scale if link.endswith("knee") else 0.0
-        flags = demonstration.contacts.get(link, distance[rows, nearest] <= DISTANCE + depth)
+        flags = demonstration.contacts.get(link, distance.min(axis=1) <= DISTANCE + depth)
         contacts[link] = np.array(flags, bool)
-        at = closest.reshape(frames, -1, 3)[rows, nearest]
-        touched[link] = np.where(contacts[link][:, None], at, np.nan)
+        touched[link] = np.full((frames, 3), np.nan)
+        touching = contacts[link]
+        patch = _patch(closest.reshape(frames, -1, 3)[touching], distance[touching])
+        touched[link][touching] = project(link, patch, eyes[touching])[0]
     return contacts, touched
+
+
+def _patch(closest: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """(T, 3) middle of the touched patch, from the projections of (T, J) joints.
+
+    A joint counts the less the less deep it is than the deepest one, so the middle does not jump
+    from finger to finger as the deepest one does.
+    """
+    behind = distance - distance.min(axis=1, keepdims=True)
+    weights = np.maximum(1.0 - behind / DISTANCE, 0.0)
+    return (weights[..., None] * closest).sum(axis=1) / weights.sum(axis=1, keepdims=True)

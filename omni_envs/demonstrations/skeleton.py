@@ -124,8 +124,10 @@ MOCAP = Skeleton(
         *_mocap_leg("Right"),
         *("LeftFootMod", "RightFootMod"),
     ),
-    # OmniRetarget's choice, kept so that results compare: Spine1, 0.3 m above Hips, leads the
-    # pelvis; the hand is the middle fingertip.
+    # Spine1, 0.3 m above Hips, leads the pelvis, as OmniRetarget chose. Its hand is the middle
+    # fingertip, for a robot that ends in a ball there. Here it is the wrist, as in all other
+    # formats: our keypoint is where the robot's hand is mounted, and with a fingertip instead a
+    # hand of human length ends inside what the human touches.
     keypoint_joints=_keypoints(
         "Spine1",
         hip="{Left}UpLeg",
@@ -134,7 +136,7 @@ MOCAP = Skeleton(
         toe="{Left}ToeBase",
         shoulder="{Left}Arm",
         elbow="{Left}ForeArm",
-        hand="{Left}HandMiddle3",
+        hand="{Left}Hand",
     ),
     contact_joints=_mocap_contacts({s: _mocap_arm(s)[3:] for s in ("Left", "Right")}),
 )

@@ -14,8 +14,8 @@ def resample_source(source: SourceMotion, fps: float) -> SourceMotion:
     """Brings a source motion to another frame rate without inventing anything.
 
     Keypoints are interpolated linearly, objects on the manifold of poses. A new frame stands or
-    touches exactly when the old frames on both sides of it do; it then touches the point of the
-    nearer one. So a new schedule never holds where the old one does not, and a motion solved for
+    touches exactly when the old frames on both sides of it do; it then touches the point between
+    theirs. So a new schedule never holds where the old one does not, and a motion solved for
     the old schedules satisfies the new ones.
 
     Args:
@@ -27,7 +27,6 @@ def resample_source(source: SourceMotion, fps: float) -> SourceMotion:
     """
     left, weight = frame_grid(source.num_frames, source.fps, fps)
     right = np.minimum(left + (weight > 0), source.num_frames - 1)
-    nearest = np.where(weight > 0.5, right, left)
 
     def both(flags: np.ndarray) -> np.ndarray:
         return flags[left] & flags[right]
@@ -36,7 +35,9 @@ def resample_source(source: SourceMotion, fps: float) -> SourceMotion:
     source_poses = source.source_object_poses
     contacts = {link: both(np.asarray(flags, bool)) for link, flags in source.contacts.items()}
     points = {
-        link: np.where(contacts[link][:, None], at[nearest], np.nan)
+        link: np.where(
+            contacts[link][:, None], at[left] + weight[:, None] * (at[right] - at[left]), np.nan
+        )
         for link, at in source.contact_points.items()
     }
     keypoints = source.keypoints[left]

@@ -100,3 +100,25 @@ def test_uneven_ground_is_touched_like_any_other():
     contacts, points = terrain_contacts(demo, demo.positions, Terrain((), field), 1.0)
     assert contacts["left_foot"].tolist() == [False, True, False]
     np.testing.assert_allclose(points["left_foot"][1], [5, 0, 0.3], atol=1e-9)
+
+
+def test_the_middle_of_the_patch_is_touched():
+    demo = standing()
+    for finger, x, z in (("Index2", 0.3, 0.0), ("Ring2", 0.4, 0.0), ("Pinky2", 0.9, 0.019)):
+        demo.positions[1, MOCAP.joint_names.index(f"LeftHand{finger}")] = [x, 0.0, z]
+    _, points = terrain_contacts(demo, demo.positions, None, 1.0)
+    # The little finger is 19 of 20 mm further off: it counts a twentieth.
+    np.testing.assert_allclose(points["left_hand"][1], [(0.7 + 0.05 * 0.9) / 2.05, 0, 0])
+
+
+def test_a_hand_inside_a_thin_plate_leaves_on_the_side_of_the_elbow():
+    plate = Terrain((Part(Box((1, 1, 0.05)), (0, 0, 1.0)),))
+    for elbow, z in ((1.5, 1.05), (0.5, 0.95)):
+        demo = standing()
+        demo.positions[..., :] = [5.0, 5.0, 5.0]
+        names = MOCAP.joint_names
+        demo.positions[1, names.index("LeftForeArm")] = [0, 0, elbow]
+        demo.positions[1, names.index("LeftHandIndex2")] = [0, 0, 0.99]  # nearer to the lower face
+        contacts, points = terrain_contacts(demo, demo.positions, plate, 1.0)
+        assert contacts["left_hand"].tolist() == [False, True, False]
+        np.testing.assert_allclose(points["left_hand"][1], [0, 0, z])
