@@ -80,10 +80,10 @@ class TensorDictPPO:
         )
 
     def learn(self, rollout: TensorDictBase) -> dict[str, float]:
-        """Updates the network from a rollout (N, T), the very first one only its normalisers.
+        """Updates the network from a rollout, the very first one only its normalisers.
 
         Args:
-            rollout: What a collector with this actor yields; time is the last dimension.
+            rollout: (…, N, T), what a collector with this actor yields.
 
         Returns:
             Means over the gradient steps: ``kl``, ``surrogate_loss``, ``value_loss``, ``entropy``,
@@ -95,6 +95,7 @@ class TensorDictPPO:
         """
         normalizers = self.network.mlp_extractor
         figures: dict[str, float] = {}
+        rollout = rollout.reshape(-1, rollout.shape[-1])
         if int(normalizers.actor_normalizer.count) > 0:
             with torch.no_grad():
                 self.advantages(rollout)
