@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from omni_envs.demonstrations.builtin.box_carry import box_carry
+from omni_envs.demonstrations.builtin.climb import climb
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.errors import UnknownNameError
 
-_MAKERS: dict[str, Callable[[], Demonstration]] = {"box_carry": box_carry}
+_MAKERS: dict[str, Callable[[], Demonstration]] = {"box_carry": box_carry, "climb": climb}
 
 
 def builtin_names() -> tuple[str, ...]:
