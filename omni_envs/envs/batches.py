@@ -30,13 +30,12 @@ def copied(observations: Observation) -> Observation:
     return observations.copy()
 
 
-def put_rows(observations: Observation, ids: np.ndarray, rows: Observation) -> None:
-    """Overwrites the rows ``ids`` (K,) with the K rows given."""
-    if isinstance(observations, dict) and isinstance(rows, dict):
-        for key, values in observations.items():
-            values[ids] = rows[key]
-    elif isinstance(observations, np.ndarray):
-        observations[ids] = rows
+def empty_observations(num: int, policy: int, critic: int | None) -> Observation:
+    """Returns room for N observations."""
+    if critic is None:
+        return np.empty((num, policy), np.float32)
+    sizes = {"policy": policy, "critic": critic}
+    return {key: np.empty((num, size), np.float32) for key, size in sizes.items()}
 
 
 def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
@@ -68,10 +67,11 @@ def add_finals(
             if isinstance(observations, dict)
             else observations[i].copy()
         )
-    final_info = {k: done.copy() if k.startswith("_") else v.copy() for k, v in infos.items()}
+    mask = done.copy()
+    final_info = {k: mask if k.startswith("_") else v for k, v in infos.items()}
     return infos | {
         "final_obs": final_obs,
-        "_final_obs": done.copy(),
+        "_final_obs": mask,
         "final_info": final_info,
-        "_final_info": done.copy(),
+        "_final_info": mask,
     }

@@ -86,6 +86,7 @@ class Episodes:
         possible: (N,) control steps from the start to the end of motion or time.
         action: (N, n) previous action.
         default: (N, n) default joint positions, randomization included, rad.
+        rows: (N,) row of the library's table to track next.
         next_push: (N,) control steps until the next push.
 
     Args:
@@ -110,12 +111,7 @@ class Episodes:
         self.motion, self.frame = np.zeros(num, int), np.zeros(num, int)
         self.elapsed, self.possible = np.zeros(num, int), np.ones(num, int)
         self.action, self.default = np.zeros((num, joints)), np.tile(default, (num, 1))
-        self.next_push = np.zeros(num, int)
-
-    @property
-    def table_index(self) -> np.ndarray:
-        """(N,) row of the library to track next."""
-        return self._library.starts[self.motion] + self.frame
+        self.next_push, self.rows = np.zeros(num, int), np.zeros(num, int)
 
     def start(
         self, ids: np.ndarray, motion: np.ndarray, frame: np.ndarray, rng: np.random.Generator
@@ -131,6 +127,7 @@ class Episodes:
         self.motion[ids], self.frame[ids], self.elapsed[ids] = motion, frame + 1, 0
         left = self._library.lengths[motion] - 1 - frame
         self.possible[ids] = left if self._max_steps is None else np.minimum(left, self._max_steps)
+        self.rows[ids] = self._library.starts[motion] + frame + 1
         self.action[ids] = 0.0
         half = self._config.randomization.joint_default
         spread = (2.0 * rng.random((len(ids), len(self._nominal))) - 1.0) * half
@@ -146,6 +143,7 @@ class Episodes:
         self.action = action
         self.elapsed += 1
         self.frame = np.minimum(self.frame + 1, self._library.lengths[self.motion] - 1)
+        self.rows = self._library.starts[self.motion] + self.frame
         return self.elapsed >= self.possible
 
     def due_pushes(self, rng: np.random.Generator) -> np.ndarray:

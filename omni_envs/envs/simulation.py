@@ -10,6 +10,7 @@ from omni_envs.envs.kinematics import BodyKinematics
 from omni_envs.envs.model import EnvModel
 from omni_envs.envs.variants import ModelVariants
 from omni_envs.robots import Robot
+from omni_envs.tracking import kernels
 from omni_envs.tracking.alignment import Bodies
 
 SPEED_LIMIT = 1e3
@@ -34,6 +35,7 @@ class Simulation:
         qpos: (N, nq) live: robot 7 + n, then the object's 7.
         qvel: (N, nv) live; angular parts of free joints in the body frame.
         ctrl: (N, n) live joint targets, rad.
+        history: (N, nhistory) live, of the contact sensors; see ``EnvModel.contact_forces``.
 
     Args:
         env_model: The model.
@@ -59,13 +61,16 @@ class Simulation:
         self.batch = Batch(model, num, threads)
         self.qpos, self.qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         self.ctrl, self._warmstart = self.batch.bind("ctrl"), self.batch.bind("qacc_warmstart")
-        self._history = self.batch.bind("history")
-        self._kinematics = BodyKinematics(robot, num, threads)
+        self.history = self.batch.bind("history")
+        self._kinematics = BodyKinematics(robot, num)
         self._variants, self._fields = variants, variants.attach(self.batch)
         self.variant = np.zeros(num, int)
         self._diverged = np.zeros(num, bool)
         self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
-        self._use_variants(np.arange(num))
+        self._rows = [
+            (_flat(variants.fields[name]), _flat(live)) for name, live in self._fields.items()
+        ]
+        self._use_variants(np.arange(num), self.variant)
 
     def step(self) -> np.ndarray:
         """Advances every simulation by a control step under ``ctrl``.
@@ -77,38 +82,34 @@ class Simulation:
             np.copyto(kept, now)
         self.batch.step(nstep=self._substeps)
         # MuJoCo resets a simulation that blew up without a word, and only counts a warning.
-        diverged = self.batch.warning[:, _BAD_STATE, 1].any(axis=1)
-        # Written so that NaN counts as diverged.
-        diverged |= ~(np.abs(self.qvel).max(axis=1) < SPEED_LIMIT)
-        diverged |= ~np.isfinite(self.qpos).all(axis=1)
-        if diverged.any():
+        warnings, diverged = self.batch.warning[:, _BAD_STATE, 1], np.empty(self.num, bool)
+        if kernels.exploded(self.qpos, self.qvel, warnings, SPEED_LIMIT, diverged):
             self.qpos[diverged], self.qvel[diverged] = (a[diverged] for a in self._before[:2])
             self._warmstart[diverged] = 0.0
             self._diverged |= diverged
         self._kinematics.update(self.qpos, self.qvel)
         return diverged
 
-    def reset(
-        self, ids: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, variant: np.ndarray
-    ) -> None:
-        """Starts simulations anew.
+    def reset(self, ids: np.ndarray, variant: np.ndarray) -> None:
+        """Readies simulations to start anew: write their states next, then ``place_bodies``.
 
         Args:
             ids: (K,) sorted indices of the simulations.
-            qpos: (K, nq) start positions.
-            qvel: (K, nv) start velocities.
             variant: (K,) indices of their randomized models.
         """
-        # What a state consists of is written below; MuJoCo's own reset, which costs more than all
+        # What a state consists of is written by us; MuJoCo's own reset, which costs more than all
         # of that, is for simulations that it has counted warnings of.
-        spoilt = ids[self._diverged[ids]]
-        if len(spoilt):
-            self.batch.reset(spoilt, stage=_NOTHING)
-            self._diverged[spoilt] = False
+        if self._diverged.any():
+            spoilt = ids[self._diverged[ids]]
+            if len(spoilt):
+                self.batch.reset(spoilt, stage=_NOTHING)
+                self._diverged[spoilt] = False
         self._warmstart[ids] = 0.0
         self.variant[ids] = variant
-        self._use_variants(ids)
-        self.qpos[ids], self.qvel[ids] = qpos, qvel
+        self._use_variants(ids, variant)
+
+    def place_bodies(self, ids: np.ndarray | None = None) -> None:
+        """Computes the tracked bodies anew, of all simulations or of some."""
         self._kinematics.update(self.qpos, self.qvel, ids)
 
     def bodies(self, ids: np.ndarray | None = None) -> Bodies:
@@ -117,7 +118,7 @@ class Simulation:
 
     def contact_forces(self) -> np.ndarray:
         """Returns the (N, sensors, samples, 3) contact forces of the last control step, N."""
-        return self._env_model.contact_forces(self._history)
+        return self._env_model.contact_forces(self.history)
 
     def before(self, sim: int) -> dict[str, np.ndarray]:
         """Returns the state of one simulation before its last control step, for a replay."""
@@ -136,8 +137,16 @@ class Simulation:
         if self._variants.models:
             other.set_models([self._variants.models[v] for v in self.variant])
 
-    def _use_variants(self, ids: np.ndarray) -> None:
-        for name, values in self._variants.fields.items():
-            self._fields[name][ids] = values[self.variant[ids]]
+    def _use_variants(self, ids: np.ndarray, variant: np.ndarray) -> None:
+        for values, live in self._rows:
+            kernels.copy_rows(values, variant, ids, live)
         if self._variants.models:
             self.batch.set_models([self._variants.models[v] for v in self.variant])
+
+
+def _flat(values: np.ndarray) -> np.ndarray:
+    """A view with one row per first index."""
+    rows = values.reshape(len(values), -1)
+    if not np.shares_memory(rows, values):
+        raise RuntimeError("Model fields must be written without copies.")
+    return rows

@@ -8,7 +8,7 @@ import numpy as np
 
 from omni_envs.errors import InvalidDataError, UnknownNameError
 from omni_envs.robots import Robot
-from omni_envs.tracking import observations, quaternion, rewards, terminations
+from omni_envs.tracking import kernels, observations, quaternion, rewards, terminations
 from omni_envs.tracking.alignment import Bodies, align
 from omni_envs.tracking.config import TrackingConfig
 from omni_envs.tracking.motion import Frames
@@ -36,6 +36,7 @@ class TrackingTask:
     Attributes:
         config: The numbers.
         terms: Names of the reward terms.
+        errors: Names of the tracking errors.
         anchor: Index of the anchor among the tracked bodies.
         soft_lower: (n,) rad.
         soft_upper: (n,) rad.
@@ -74,9 +75,9 @@ class TrackingTask:
         self.policy_layout = observations.policy_layout(config.observation, n)
         self.critic_layout = observations.critic_layout(n, len(names), has_object)
         reward, dt = config.reward, config.physics.control_step
-        self._errors = [n for n in rewards.TRACKING_TERMS if has_object or "object" not in n]
-        kept = [i for i, n in enumerate(self._errors) if getattr(reward, n) is not None]
-        tracking = {self._errors[i]: getattr(reward, self._errors[i]) for i in kept}
+        self.errors = tuple(n for n in rewards.TRACKING_TERMS if has_object or "object" not in n)
+        kept = [i for i, n in enumerate(self.errors) if getattr(reward, n) is not None]
+        tracking = {self.errors[i]: getattr(reward, self.errors[i]) for i in kept}
         self.terms = (*tracking, *rewards.PENALTY_TERMS)
         self._columns = kept
         self._inverse_variance = np.array([-1.0 / t.sigma**2 for t in tracking.values()])
@@ -85,9 +86,50 @@ class TrackingTask:
         self._weights = np.array(weights) * dt
         width = self.policy_layout.noise
         noisy = np.flatnonzero(width)
-        self._noisy = slice(noisy[0], noisy[-1] + 1) if len(noisy) else slice(0, 0)
+        self._noisy = slice(int(noisy[0]), int(noisy[-1]) + 1) if len(noisy) else slice(0, 0)
         # Uniform noise is drawn in [-½, ½).
         self._noise_width = 2.0 * width[self._noisy]
+
+    def numbers(self, samples: int) -> kernels.Numbers:
+        """Returns the task in the form that the compiled loops take.
+
+        Args:
+            samples: Physics steps that a contact sensor remembers.
+        """
+        config, robot = self.config, self._robot
+        limits = config.termination
+        oriented = np.ones(len(robot.tracked_bodies), bool)
+        if self._oriented is not None:
+            oriented[:] = False
+            oriented[self._oriented] = True
+        thresholds = (
+            limits.anchor_height,
+            limits.anchor_tilt,
+            limits.end_effector_height,
+            limits.object_position,
+            limits.object_angle,
+        )
+        noisy = config.observation.noise is not None
+        return kernels.Numbers(
+            anchor=self.anchor,
+            root_nq=robot.nq,
+            root_nv=robot.nv,
+            has_object=self._has_object,
+            oriented=oriented,
+            end_effectors=self._end_effectors,
+            lower=self.soft_lower,
+            upper=self.soft_upper,
+            columns=np.array(self._columns, int),
+            inverse_variance=self._inverse_variance,
+            weights=self._weights,
+            samples=samples,
+            by_substep=config.reward.contact_rule == "substeps",
+            contact_force=float(config.reward.contact_force),
+            thresholds=np.array([np.inf if t is None else t for t in thresholds]),
+            state_estimation=config.observation.state_estimation,
+            noise_start=self._noisy.start,
+            noise_width=self._noise_width if noisy else self._noise_width[:0],
+        )
 
     def full_state(self, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
         """Returns (N, nq) and (N, nv): the reference as a state of the simulation."""
@@ -152,7 +194,7 @@ class TrackingTask:
         tracking = np.exp(e[:, self._columns] * self._inverse_variance)
         values = np.concatenate([tracking, np.stack(penalties, axis=1)], axis=1) * self._weights
         terms = dict(zip(self.terms, values.T, strict=True))
-        errors = dict(zip(self._errors, np.sqrt(e).T, strict=True))
+        errors = dict(zip(self.errors, np.sqrt(e).T, strict=True))
         tests = self._tests(bodies, reference, squared, object_active)
         return Judgement(values.sum(axis=1), terms, errors, tests)
 

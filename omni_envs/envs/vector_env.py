@@ -16,9 +16,10 @@ from omni_envs.envs.batches import (
     add_finals,
     batched_infos,
     copied,
+    empty_observations,
     observation_space,
-    put_rows,
 )
+from omni_envs.envs.compiled import CompiledTask
 from omni_envs.envs.divergence import Divergence, DivergenceLog
 from omni_envs.envs.episodes import Episodes, NoiseLevel, ObjectGate
 from omni_envs.envs.model import build_model
@@ -30,6 +31,7 @@ from omni_envs.envs.task import TrackingTask
 from omni_envs.envs.variants import ModelVariants
 from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
 from omni_envs.robots import Robot, get_robot
+from omni_envs.tracking import kernels
 from omni_envs.tracking.config import (
     ActionConfig,
     ObservationConfig,
@@ -41,9 +43,9 @@ from omni_envs.tracking.config import (
     make_config,
 )
 from omni_envs.tracking.feedforward import action_targets
-from omni_envs.tracking.motion import Frames, MotionLibrary
+from omni_envs.tracking.motion import MotionLibrary
 from omni_envs.tracking.motion_sampling import MotionSampler
-from omni_envs.tracking.randomization import push, start_state
+from omni_envs.tracking.randomization import push
 
 RESET_OPTIONS = ("reset_mask", "motion", "frame")
 """Options of ``reset``."""
@@ -168,13 +170,14 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._library = MotionLibrary(self.robot, self.references, 1 / dt, self.action_targets)
         self.scenes, self._scene_of = distinct_scenes(self.references)
         self._pictures = Pictures(self.robot, self.scenes, width, height)
-        self._task = TrackingTask(self.robot, config, self._library.has_object)
+        plain = TrackingTask(self.robot, config, self._library.has_object)
         models = [build_model(self.robot, scene, config) for scene in self.scenes]
         objects = [scene.object for scene in self.scenes]
         self._variants = ModelVariants(models, self.robot, objects, config.randomization)
         self.simulation = Simulation(
             models[0], self.robot, self._variants, num_envs, config.physics.substeps, num_threads
         )
+        self._task = CompiledTask(plain, self._library, models[0].samples)
         if max_episode_steps is None and config.termination.max_seconds is not None:
             max_episode_steps = max(round(config.termination.max_seconds / dt), 1)
         default = self.robot.default_joint_array
@@ -184,12 +187,17 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.sampler = MotionSampler(self._library, config.reset)
         self.divergences = DivergenceLog()
         self._scale = self.robot.action_scale * config.action.scale
-        self._frames: Frames | None = None
-        self._observations: Observation | None = None
-        self.policy_layout = self._task.policy_layout
-        self.critic_layout = self._task.critic_layout
+        # What residual actions count from, as actions.
+        targets = self._library.targets
+        self._lead = np.empty((0, self.robot.num_joints))
+        if targets is not None:
+            self._lead = (targets - self.robot.default_joint_array) / self._scale
+        self._everyone = np.arange(num_envs)
+        self._started = False
+        self.policy_layout, self.critic_layout = plain.policy_layout, plain.critic_layout
         critic = self.critic_layout.size if config.observation.privileged else None
         self.single_observation_space = observation_space(self.policy_layout.size, critic)
+        self._observations = empty_observations(num_envs, self.policy_layout.size, critic)
         limit, joints = config.action.limit, self.robot.num_joints
         self.single_action_space = spaces.Box(-limit, limit, (joints,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -241,14 +249,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             mask = np.asarray(mask)
             if mask.shape != (self.num_envs,) or mask.dtype != bool:
                 raise InvalidOptionError(f"reset_mask must be ({self.num_envs},) bool.")
-            if self._observations is None and not mask.all():
+            if not self._started and not mask.all():
                 raise InvalidOptionError("reset_mask: the first reset must start every simulation.")
             ids = np.flatnonzero(mask)
         self._start(ids, **options)
-        if self._observations is not None and len(ids) < self.num_envs:
-            put_rows(self._observations, ids, self._observe(ids))
-        else:
-            self._observations = self._observe()
+        self._started = True
         return copied(self._observations), self._place()
 
     def step(
@@ -266,32 +271,47 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         Raises:
             InvalidDataError: The actions have another shape.
         """
-        if self._frames is None:
+        if not self._started:
             raise InvalidOptionError("step: call reset first.")
-        episodes, frames = self._episodes, self._frames
-        action, bad = self._checked(actions)
-        if frames.target is not None:
-            # From here on the standard action of the same joint target: rewards and the observed
-            # previous action then mean the same in all modes, and for an exported policy.
-            action += (frames.target - self.robot.default_joint_array) / self._scale
-        np.copyto(self.simulation.ctrl, episodes.default + self._scale * action)
-        diverged = self.simulation.step() | bad
-        bodies = self.simulation.bodies()
+        episodes, simulation, rows = self._episodes, self.simulation, self._episodes.rows
+        actions = np.ascontiguousarray(actions, float)
+        if actions.shape != self.action_space.shape:
+            raise InvalidDataError(
+                type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"
+            )
+        # From here on an action is the standard one of the same joint target: rewards and the
+        # observed previous action then mean the same in all modes, and for an exported policy.
+        action, bad = np.empty_like(actions), np.empty(self.num_envs, bool)
+        kernels.joint_targets(
+            actions,
+            self.config.action.limit,
+            self._lead,
+            rows,
+            episodes.default,
+            self._scale,
+            action,
+            simulation.ctrl,
+            bad,
+        )
+        diverged = simulation.step()
+        diverged |= bad
+        bodies = simulation.bodies()
         judged = self._task.judge(
-            self.simulation.qpos,
+            rows,
+            simulation.qpos,
             bodies,
-            frames,
             action,
             episodes.action,
-            self.simulation.contact_forces(),
+            simulation.history,
             self._gate.open,
         )
         terminated = diverged.copy()
         for lost in judged.tests.values():
             terminated |= lost
         infos = self._infos(judged, diverged)
-        reward = np.where(diverged, 0.0, judged.reward)
+        reward = judged.reward
         if diverged.any():
+            reward[diverged] = 0.0
             self._record_divergence(np.flatnonzero(diverged))
         ended_frame = episodes.frame
         truncated = episodes.advance(action) & ~terminated
@@ -304,16 +324,13 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         failed = np.flatnonzero(terminated)
         self.sampler.record(episodes.motion[failed], ended_frame[failed])
         self._push(done)
-        self._frames = self._library.frames(episodes.table_index)
-        observations = self._observe(bodies=bodies)
+        self._observe(self._everyone)
         infos |= self._place()
         if len(finished) and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            infos = add_finals(infos, observations, done)
+            infos = add_finals(infos, self._observations, done)
             self._start(finished)
-            put_rows(observations, finished, self._observe(finished))
             infos |= self._place()
-        self._observations = observations
-        return copied(observations), reward, terminated, truncated, infos
+        return copied(self._observations), reward, terminated, truncated, infos
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Returns one (height, width, 3) uint8 picture per simulation, the reference as a ghost."""
@@ -323,26 +340,15 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     def render_one(self, index: int = 0) -> np.ndarray:
         """Returns a (height, width, 3) uint8 picture of one simulation and its reference."""
-        if self._frames is None:
+        if not self._started:
             raise InvalidOptionError("render: call reset first.")
         scene = int(self._scene_of[self._episodes.motion[index]])
-        return self._pictures.render(scene, self.simulation.qpos[index], self._frames, index)
+        frames = self._library.frames(self._episodes.rows)
+        return self._pictures.render(scene, self.simulation.qpos[index], frames, index)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Frees the graphics context."""
         self._pictures.close()
-
-    def _checked(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        actions = np.asarray(actions, float)
-        if actions.shape != self.action_space.shape:
-            raise InvalidDataError(
-                type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"
-            )
-        limit = self.config.action.limit
-        bad = ~np.isfinite(actions).all(axis=1)
-        if bad.any():
-            actions = np.where(bad[:, None], 0.0, actions)
-        return np.minimum(np.maximum(actions, -limit), limit), bad
 
     def _start(
         self,
@@ -350,28 +356,21 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         motion: int | np.ndarray | None = None,
         frame: int | np.ndarray | None = None,
     ) -> None:
-        """Puts simulations into start frames, drawn where not given."""
+        """Puts simulations into start frames, drawn where not given, and observes them."""
         if not len(ids):
             return
         rng, count = self.np_random, len(ids)
         motions, places = self.sampler.draw(count, rng)
         if frame is not None or motion is not None:
             motions, places = self._library.places(motion, frame, count)
-        start = self._library.frames(self._library.starts[motions] + places)
-        qpos, qvel = self._task.full_state(start)
-        qpos, qvel = start_state(
-            qpos,
-            qvel,
-            self.config.reset.noise,
-            self._task.soft_lower,
-            self._task.soft_upper,
-            rng,
-            self._noise.draw(count, rng),
-        )
-        variant = self._variants.choose(self._scene_of[motions], rng)
-        self.simulation.reset(ids, qpos, qvel, variant)
+        simulation = self.simulation
+        simulation.reset(ids, self._variants.choose(self._scene_of[motions], rng))
+        start = self._library.starts[motions] + places
+        share = self._noise.draw(count, rng)
+        self._task.start(start, rng, ids, simulation.qpos, simulation.qvel, share)
+        simulation.place_bodies(ids)
         self._episodes.start(ids, motions, places, rng)
-        self._frames = self._library.frames(self._episodes.table_index)
+        self._observe(ids)
 
     def _push(self, done: np.ndarray) -> None:
         due = self._episodes.due_pushes(self.np_random)
@@ -382,17 +381,19 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
                 self.simulation.qpos[due, 3:7], config, self.np_random
             )
 
-    def _observe(self, ids: np.ndarray | None = None, bodies: Any = None) -> Observation:
-        sim, episodes, frames = self.simulation, self._episodes, self._frames
-        assert frames is not None
-        if ids is None:
-            bodies = sim.bodies() if bodies is None else bodies
-            rows = (sim.qpos, sim.qvel, bodies, frames, episodes.default, episodes.action)
-        else:
-            frames = self._library.frames(episodes.table_index[ids])
-            default, action = episodes.default[ids], episodes.action[ids]
-            rows = (sim.qpos[ids], sim.qvel[ids], sim.bodies(ids), frames, default, action)
-        return self._task.observe(*rows, self.np_random)
+    def _observe(self, ids: np.ndarray) -> None:
+        simulation, episodes = self.simulation, self._episodes
+        self._task.observe(
+            episodes.rows,
+            simulation.qpos,
+            simulation.qvel,
+            simulation.bodies(),
+            episodes.default,
+            episodes.action,
+            self.np_random,
+            ids,
+            self._observations,
+        )
 
     def _infos(self, judged: Any, diverged: np.ndarray) -> dict[str, Any]:
         values = {f"reward/{k}": v for k, v in judged.terms.items()}

@@ -36,6 +36,30 @@ class Frames(NamedTuple):
     target: np.ndarray | None = None
 
 
+class Columns(NamedTuple):
+    """First column of every part of the table's rows; see ``Frames`` for the parts.
+
+    Attributes:
+        qpos: 7 + n columns.
+        qvel: 6 + n columns.
+        position: 3 columns per tracked body.
+        quaternion: 4 columns per tracked body.
+        linear: 3 columns per tracked body.
+        angular: 3 columns per tracked body.
+        object_pose: 7 columns; the end of the row without an object, as the next.
+        object_velocity: 6 columns.
+    """
+
+    qpos: int
+    qvel: int
+    position: int
+    quaternion: int
+    linear: int
+    angular: int
+    object_pose: int
+    object_velocity: int
+
+
 class MotionLibrary:
     """The frames of one or more references of one robot, one after the other.
 
@@ -43,6 +67,9 @@ class MotionLibrary:
         starts: (M,) first frame of every motion in the table.
         lengths: (M,) frames of every motion.
         has_object: Whether the motions carry an object.
+        table: (rows, columns) all frames.
+        at: Where the parts of a frame are in its row.
+        targets: (rows, n) what residual actions count from, or None.
 
     Args:
         robot: The robot.
@@ -80,8 +107,11 @@ class MotionLibrary:
         self._bodies, self._nq, self._nv = len(robot.tracked_bodies), robot.nq, robot.nv
         self.lengths = np.array([r.num_frames for r in references])
         self.starts = np.concatenate([[0], np.cumsum(self.lengths)[:-1]])
-        self._table = np.concatenate([self._rows(robot, r) for r in references])
-        self._targets = None if targets is None else np.concatenate(targets)
+        self.table = np.concatenate([self._rows(robot, r) for r in references])
+        self.targets = None if targets is None else np.concatenate(targets)
+        b = self._bodies
+        sizes = [self._nq, self._nv, 3 * b, 4 * b, 3 * b, 3 * b, 7 if self.has_object else 0]
+        self.at = Columns(*(int(c) for c in np.cumsum([0, *sizes])))
 
     @property
     def num_motions(self) -> int:
@@ -91,14 +121,14 @@ class MotionLibrary:
     @property
     def num_frames(self) -> int:
         """Frames of all motions together."""
-        return len(self._table)
+        return len(self.table)
 
     def frames(self, index: np.ndarray) -> Frames:
         """Returns the table's frames at (N,) indices, as fresh arrays."""
-        frames = self._split(np.take(self._table, index, axis=0))
-        if self._targets is None:
+        frames = self._split(np.take(self.table, index, axis=0))
+        if self.targets is None:
             return frames
-        return frames._replace(target=np.take(self._targets, index, axis=0))
+        return frames._replace(target=np.take(self.targets, index, axis=0))
 
     def places(
         self, motion: int | np.ndarray | None, frame: int | np.ndarray | None, count: int

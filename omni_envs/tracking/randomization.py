@@ -10,10 +10,24 @@ from omni_envs.tracking import quaternion
 from omni_envs.tracking.config import PushConfig, ResetNoise
 
 
-def symmetric(rng: np.random.Generator, count: int, half_widths: Sequence[float]) -> np.ndarray:
+def symmetric(
+    rng: np.random.Generator, count: int, half_widths: Sequence[float] | np.ndarray
+) -> np.ndarray:
     """Returns (count, len(half_widths)) uniform draws from ± the half widths."""
     width = np.asarray(half_widths, float)
     return (2.0 * rng.random((count, len(width))) - 1.0) * width
+
+
+def start_widths(noise: ResetNoise, joints: int) -> np.ndarray:
+    """Returns (15 + n,) half widths in the order that start states are drawn in."""
+    parts = (
+        noise.root_position,
+        noise.root_orientation,
+        noise.root_linear_velocity,
+        noise.root_angular_velocity,
+        noise.object_position,
+    )
+    return np.concatenate([*parts, np.full(joints, noise.joint_position)])
 
 
 def start_state(
@@ -44,15 +58,7 @@ def start_state(
     if noise is None:
         return qpos, qvel
     n = len(lower)
-    widths = (
-        *noise.root_position,
-        *noise.root_orientation,
-        *noise.root_linear_velocity,
-        *noise.root_angular_velocity,
-        *noise.object_position,
-        *[noise.joint_position] * n,
-    )
-    draws = symmetric(rng, len(qpos), widths)
+    draws = symmetric(rng, len(qpos), start_widths(noise, n))
     if share is not None:
         draws *= share[:, None]
     position, orientation, linear, spin, object_position = (

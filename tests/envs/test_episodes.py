@@ -23,9 +23,9 @@ def start(library, num=3000, max_steps=500, **options):
 def test_the_frame_after_the_start_is_tracked_first(library):
     episodes, _ = start(library, 2)
     assert episodes.frame.tolist() == [11, 11]
-    assert episodes.table_index.tolist() == [11, 11]
+    assert episodes.rows.tolist() == [11, 11]
     episodes.start(np.array([1]), np.array([1]), np.array([4]), np.random.default_rng(0))
-    assert episodes.table_index.tolist() == [11, 125]
+    assert episodes.rows.tolist() == [11, 125]
 
 
 def test_the_last_frame_is_judged_and_then_the_episode_is_over(library):

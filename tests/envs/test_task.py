@@ -21,7 +21,8 @@ def playback(make, quiet):
         action = np.zeros((len(frames), 29))
         forces = np.zeros((len(frames), 1, 4, 3))
         bodies = simulation.bodies()
-        return env._task.judge(simulation.qpos, bodies, reference, action, action, forces, True)
+        task = TrackingTask(env.robot, env.config, library.has_object)
+        return task.judge(simulation.qpos, bodies, reference, action, action, forces, True)
 
     return judge
 
@@ -66,9 +67,9 @@ def test_weights_and_sigmas_are_used(playback, make, quiet):
     env.reset(options={"frame": 10})
     reference = env._library.frames(np.array([10]))
     env.simulation.qpos[:, 2] += 0.1
-    env.simulation._kinematics.update(env.simulation.qpos, env.simulation.qvel)
+    env.simulation.place_bodies()
     action = np.zeros((1, 29))
-    judged = env._task.judge(
+    judged = TrackingTask(env.robot, env.config, has_object=True).judge(
         env.simulation.qpos,
         env.simulation.bodies(),
         reference,

@@ -3,6 +3,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from omni_envs.envs import OmniVectorEnv
+from omni_envs.envs.task import TrackingTask
 from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
 from omni_envs.tracking.feedforward import feedforward_lead
 
@@ -190,7 +191,7 @@ def test_no_start_is_lost_already(make, preset):
     env = make(118 * 3, preset=preset, termination={"object_after": 0.0})
     frames = np.tile(np.arange(118), 3)
     env.reset(seed=0, options={"frame": frames})
-    task, library = env._task, env._library
+    task, library = TrackingTask(env.robot, env.config, True), env._library
     action = np.zeros((len(frames), 29))
     judged = task.judge(
         env.simulation.qpos,

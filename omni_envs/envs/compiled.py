@@ -1,0 +1,163 @@
+"""The tracking task on compiled loops: ``TrackingTask`` straight from the motion table."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omni_envs.envs.task import Judgement, TrackingTask
+from omni_envs.tracking import kernels
+from omni_envs.tracking.alignment import Bodies
+from omni_envs.tracking.motion import MotionLibrary
+from omni_envs.tracking.randomization import start_widths, symmetric
+
+TESTS = ("anchor_height", "anchor_tilt", "end_effector_height", "object")
+
+
+class CompiledTask:
+    """Rewards, terminations, observations and start states of N simulations in few passes.
+
+    Attributes:
+        numbers: What the loops know of the configuration.
+
+    Args:
+        task: The task, names resolved.
+        library: The motions.
+        samples: Physics steps that a contact sensor remembers.
+    """
+
+    def __init__(self, task: TrackingTask, library: MotionLibrary, samples: int) -> None:
+        self.numbers = task.numbers(samples)
+        self._table, self._at = library.table, library.at
+        self._terms, self._errors = task.terms, task.errors
+        limits = task.config.termination
+        configured = (
+            limits.anchor_height is not None,
+            limits.anchor_tilt is not None,
+            limits.end_effector_height is not None,
+            library.has_object,
+        )
+        self._tests = [(k, name) for k, name in enumerate(TESTS) if configured[k]]
+        noise = task.config.reset.noise
+        joints = len(task.soft_lower)
+        self._widths = None if noise is None else start_widths(noise, joints)
+        self._noisy = len(self.numbers.noise_width)
+        self._nothing = np.empty((0, 0))
+        self._silence = np.empty((0, 0), np.float32)
+
+    def judge(
+        self,
+        rows: np.ndarray,
+        qpos: np.ndarray,
+        bodies: Bodies,
+        action: np.ndarray,
+        previous_action: np.ndarray,
+        history: np.ndarray,
+        object_active: bool,
+    ) -> Judgement:
+        """Compares the states after a control step with the frames that the policy saw.
+
+        Args:
+            rows: (N,) frames as rows of the library's table.
+            qpos: (N, nq).
+            bodies: The robot's tracked bodies.
+            action: (N, n).
+            previous_action: (N, n).
+            history: (N, nhistory) of the contact sensors.
+            object_active: Whether losing the object ends an episode.
+        """
+        num = len(rows)
+        terms, errors = np.empty((len(self._terms), num)), np.empty((len(self._errors), num))
+        tests, reward = np.empty((len(TESTS), num), bool), np.empty(num)
+        kernels.judge(
+            self.numbers,
+            self._at,
+            self._table,
+            rows,
+            qpos,
+            bodies,
+            action,
+            previous_action,
+            history,
+            object_active,
+            terms,
+            errors,
+            tests,
+            reward,
+        )
+        return Judgement(
+            reward,
+            dict(zip(self._terms, terms, strict=True)),
+            dict(zip(self._errors, errors, strict=True)),
+            {name: tests[k] for k, name in self._tests},
+        )
+
+    def observe(
+        self,
+        rows: np.ndarray,
+        qpos: np.ndarray,
+        qvel: np.ndarray,
+        bodies: Bodies,
+        default: np.ndarray,
+        action: np.ndarray,
+        rng: np.random.Generator,
+        ids: np.ndarray,
+        out: np.ndarray | dict[str, np.ndarray],
+    ) -> None:
+        """Writes the observations of the simulations ``ids`` (K,) into their rows of ``out``.
+
+        Args:
+            rows: (N,) the frames to track next, as rows of the library's table.
+            qpos: (N, nq).
+            qvel: (N, nv).
+            bodies: The robot's tracked bodies.
+            default: (N, n) default joint positions.
+            action: (N, n) previous action.
+            rng: Source of the noise.
+            ids: (K,) simulations.
+            out: (N, size) float32, or ``{"policy": …, "critic": …}``.
+        """
+        noise = self._silence
+        if self._noisy:
+            noise = rng.random((len(ids), self._noisy), dtype=np.float32)
+        policy, critic = (
+            (out["policy"], out["critic"]) if isinstance(out, dict) else (out, self._silence)
+        )
+        kernels.observe(
+            self.numbers,
+            self._at,
+            self._table,
+            rows,
+            qpos,
+            qvel,
+            bodies,
+            default,
+            action,
+            noise,
+            ids,
+            policy,
+            critic,
+        )
+
+    def start(
+        self,
+        rows: np.ndarray,
+        rng: np.random.Generator,
+        ids: np.ndarray,
+        qpos: np.ndarray,
+        qvel: np.ndarray,
+        share: np.ndarray | None = None,
+    ) -> None:
+        """Writes start states into the rows ``ids`` (K,) of (N, nq) and (N, nv), disturbed.
+
+        Args:
+            rows: (K,) frames to start in, as rows of the library's table.
+            rng: Source of the disturbance.
+            ids: (K,) simulations.
+            qpos: (N, nq) to write to.
+            qvel: (N, nv) to write to.
+            share: (K,) share of the disturbance that each gets, all of it by default.
+        """
+        draws = self._nothing if self._widths is None else symmetric(rng, len(ids), self._widths)
+        if share is not None and len(draws):
+            draws *= share[:, None]
+        kernels.start_states(self.numbers, self._at, self._table, rows, draws, ids, qpos, qvel)

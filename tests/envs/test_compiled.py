@@ -1,0 +1,153 @@
+"""The compiled loops are held to the plain functions on arrays."""
+
+import numpy as np
+import pytest
+
+from omni_envs.envs.compiled import CompiledTask
+from omni_envs.envs.model import EnvModel, build_model
+from omni_envs.envs.task import TrackingTask
+from omni_envs.robots import G1
+from omni_envs.tracking import observations
+from omni_envs.tracking.alignment import Bodies
+from omni_envs.tracking.config import make_config
+from omni_envs.tracking.motion import MotionLibrary
+from omni_envs.tracking.randomization import start_state
+
+CASES = {
+    "paper": {},
+    "beyondmimic": {"preset": "beyondmimic"},
+    "blind": {"observation": {"state_estimation": False, "noise": None}},
+    "critic": {"observation": {"privileged": True}, "anchor": "torso"},
+    "flip": {
+        "reward": {
+            "no_orientation": ("left_ankle_roll_link", "right_ankle_roll_link"),
+            "contact_rule": "substeps",
+            "object_position": None,
+        },
+        "termination": {"end_effector_height": 0.5, "anchor_tilt": None, "object_angle": None},
+        "reset": {"noise": None},
+    },
+    "alone": {},
+}
+
+
+@pytest.fixture(params=CASES)
+def case(request, sway):
+    """A task bound plainly and compiled, and 40 states close to frames of its motion."""
+    config = make_config(**CASES[request.param])
+    motion = sway(with_object=False) if request.param == "alone" else sway()
+    library = MotionLibrary(G1, [motion], 50.0)
+    plain = TrackingTask(G1, config, library.has_object)
+    model = build_model(G1, motion.scene, config)
+    rng, num = np.random.default_rng(3), 40
+    rows = rng.integers(library.num_frames, size=num)
+    frames = library.frames(rows)
+    qpos, qvel = plain.full_state(frames)
+    qpos, qvel = qpos + 0.2 * rng.normal(size=qpos.shape), qvel + 0.5 * rng.normal(size=qvel.shape)
+    bodies = [part + 0.2 * rng.normal(size=part.shape) for part in frames.bodies]
+    for quaternions in (qpos[:, 3:7], bodies[1], qpos[:, 39:43]):
+        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    action = rng.normal(size=(2, num, 29))
+    state = SimpleState(rows, frames, qpos, qvel, Bodies(*bodies), action[0], action[1])
+    return plain, CompiledTask(plain, library, model.samples), state, model, rng
+
+
+class SimpleState:
+    def __init__(self, rows, frames, qpos, qvel, bodies, action, previous):
+        self.rows, self.frames, self.qpos, self.qvel = rows, frames, qpos, qvel
+        self.bodies, self.action, self.previous = bodies, action, previous
+
+
+def sensor_history(model: EnvModel, num: int, rng) -> np.ndarray:
+    return rng.normal(size=(num, model.model.nhistory)) * rng.choice([0.1, 2.0], (num, 1))
+
+
+@pytest.mark.parametrize("object_active", [False, True])
+def test_judgements_agree(case, object_active):
+    plain, compiled, s, model, rng = case
+    history = sensor_history(model, len(s.rows), rng)
+    forces = model.contact_forces(history)
+    expected = plain.judge(s.qpos, s.bodies, s.frames, s.action, s.previous, forces, object_active)
+    found = compiled.judge(s.rows, s.qpos, s.bodies, s.action, s.previous, history, object_active)
+    np.testing.assert_allclose(found.reward, expected.reward, atol=1e-12)
+    assert list(found.terms) == list(expected.terms)
+    assert list(found.errors) == list(expected.errors)
+    assert list(found.tests) == list(expected.tests)
+    for ours, theirs in ((found.terms, expected.terms), (found.errors, expected.errors)):
+        for name, values in theirs.items():
+            np.testing.assert_allclose(ours[name], values, atol=1e-12, err_msg=name)
+    lost = []
+    for name, values in expected.tests.items():
+        np.testing.assert_array_equal(found.tests[name], values, err_msg=name)
+        lost += [values.any(), not values.all()]
+    assert any(lost) and len(np.unique(found.terms["contact"])) > 1
+
+
+def test_observations_agree(case):
+    plain, compiled, s, _, _ = case
+    default = 0.01 * s.previous
+    expected = plain.observe(
+        s.qpos, s.qvel, s.bodies, s.frames, default, s.action, np.random.default_rng(5)
+    )
+    ids = np.array([3, 7, 39])
+    for some in (np.arange(40), ids):
+        out = {k: np.zeros((40, len(v[0])), np.float32) for k, v in named(expected).items()}
+        whole = out if isinstance(expected, dict) else out["policy"]
+        rng = np.random.default_rng(5)
+        if len(some) < 40 and plain.config.observation.noise is not None:
+            continue  # other draws
+        compiled.observe(s.rows, s.qpos, s.qvel, s.bodies, default, s.action, rng, some, whole)
+        for name, values in named(expected).items():
+            np.testing.assert_allclose(out[name][some], values[some], atol=2e-6, err_msg=name)
+
+
+def named(values):
+    return values if isinstance(values, dict) else {"policy": values}
+
+
+def test_observations_agree_in_double_precision(case):
+    plain, compiled, s, _, rng = case
+    if compiled._noisy:
+        compiled._noisy = 0
+    default = 0.01 * s.previous
+    policy, critic = (np.zeros((40, n.size)) for n in (plain.policy_layout, plain.critic_layout))
+    out = {"policy": policy, "critic": critic}
+    compiled.observe(s.rows, s.qpos, s.qvel, s.bodies, default, s.action, rng, np.arange(40), out)
+    a, frames, has_object = plain.anchor, s.frames, s.frames.object_pose is not None
+    state = observations.ObservedState(
+        frames.qpos[:, 7:],
+        frames.qvel[:, 6:],
+        frames.bodies.position[:, a],
+        frames.bodies.quaternion[:, a],
+        s.bodies.position[:, a],
+        s.bodies.quaternion[:, a],
+        s.qpos[:, 3:7],
+        s.qvel[:, :3],
+        s.qvel[:, 3:6],
+        s.qpos[:, 7:36] - default,
+        s.qvel[:, 6:35],
+        s.action,
+        s.bodies,
+        s.qpos[:, 36:] if has_object else None,
+        s.qvel[:, 35:38] if has_object else None,
+    )
+    estimated = plain.config.observation.state_estimation
+    expected = observations.policy_observation(state, estimated)
+    np.testing.assert_allclose(policy, expected, atol=1e-12)
+    np.testing.assert_allclose(critic, observations.critic_observation(state), atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [None, np.array([0.0, 0.4, 1.0])], ids=["all", "share"])
+def test_start_states_agree(case, share):
+    plain, compiled, s, _, _ = case
+    ids = np.array([1, 2, 30])
+    qpos, qvel = s.qpos.copy(), s.qvel.copy()
+    compiled.start(s.rows[ids], np.random.default_rng(4), ids, qpos, qvel, share)
+    full = [part[ids] for part in plain.full_state(s.frames)]
+    noise = plain.config.reset.noise
+    rng = np.random.default_rng(4)
+    expected = start_state(*full, noise, plain.soft_lower, plain.soft_upper, rng, share)
+    np.testing.assert_allclose(qpos[ids], expected[0], atol=1e-12)
+    np.testing.assert_allclose(qvel[ids], expected[1], atol=1e-12)
+    others = np.setdiff1d(np.arange(40), ids)
+    np.testing.assert_array_equal(qpos[others], s.qpos[others])
