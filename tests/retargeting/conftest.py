@@ -14,7 +14,7 @@ from omni_envs.demonstrations import (
 )
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.retargeting.clip_qp import Band, ClipQP
-from omni_envs.robots import G1
+from omni_envs.robots import G1, SIDES
 
 
 def cut_source(source: SourceMotion, start: int, stop: int) -> SourceMotion:
@@ -69,6 +69,18 @@ def largebox(shared) -> SourceMotion:
     folder = shared / "data" / "omomo"
     clip = load_demonstration(folder / "sub3_largebox_003.pt", object_mesh=folder / "largebox.obj")
     return scale_demonstration(clip, G1.height)
+
+
+@pytest.fixture(scope="session")
+def official_g1():
+    """The G1 with the joint ranges and posture weights that OmniRetarget gives it."""
+    wrists = {"wrist_roll": (-0.1, 0.2), "wrist_pitch": (-0.1, 0.3), "wrist_yaw": (-0.05, 0.05)}
+    ranges = {f"{s}_{j}_joint": limits for s in SIDES for j, limits in wrists.items()}
+    return replace(
+        G1,
+        reference_ranges={**G1.reference_ranges, **ranges},
+        posture_weights={"waist_yaw_joint": 0.2, "waist_roll_joint": 0.2},
+    )
 
 
 @pytest.fixture(scope="session")
