@@ -9,6 +9,7 @@ import tyro
 
 from omni_envs.cli.bench import Bench
 from omni_envs.cli.convert import Convert
+from omni_envs.cli.curves import Curves
 from omni_envs.cli.demo import Demo
 from omni_envs.cli.evaluate import Evaluate
 from omni_envs.cli.export import Export
@@ -26,6 +27,7 @@ Command = (
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Export, tyro.conf.subcommand("export")]
+    | Annotated[Curves, tyro.conf.subcommand("curves")]
 )
 
 

@@ -60,7 +60,7 @@ def plot_curve(run: Path, history: History, control_dt: float) -> Path:
     ):
         values = np.array([row[key] * scale for row in history])
         axes.plot(steps, values, color="#1f5fa8", linewidth=0.6, alpha=0.35)
-        axes.plot(steps, _smoothed(values), color="#1f5fa8", linewidth=1.8)
+        axes.plot(steps, smoothed(values), color="#1f5fa8", linewidth=1.8)
         axes.set_xlabel("control steps (million)")
         axes.set_title(title, fontsize=10)
         axes.grid(alpha=0.3)
@@ -72,8 +72,8 @@ def plot_curve(run: Path, history: History, control_dt: float) -> Path:
     return path
 
 
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    """Mean of the last 2 % of all values up to each one; what is missing does not count."""
+def smoothed(values: np.ndarray) -> np.ndarray:
+    """Returns the mean of the last 2 % of all values up to each one; NaN does not count."""
     window = max(1, len(values) // 50)
     known = np.isfinite(values)
     total = np.cumsum(np.where(known, values, 0.0))

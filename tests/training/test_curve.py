@@ -8,7 +8,7 @@ pytest.importorskip("matplotlib")
 from matplotlib.image import imread
 
 from omni_envs.errors import InvalidDataError
-from omni_envs.training.curve import _smoothed, plot_curve, write_history
+from omni_envs.training.curve import plot_curve, smoothed, write_history
 
 HISTORY = [
     {
@@ -46,7 +46,7 @@ def test_nothing_to_draw_is_one_clear_error(tmp_path):
 def test_smoothing_is_the_mean_of_the_last_values():
     values = np.arange(200.0)
     values[0] = np.nan
-    smooth = _smoothed(values)
+    smooth = smoothed(values)
     assert np.isnan(smooth[0]) and smooth[1] == 1.0
     for i in (3, 4, 150, 199):
         assert smooth[i] == np.nanmean(values[max(0, i - 3) : i + 1])
