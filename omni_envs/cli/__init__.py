@@ -15,6 +15,7 @@ from omni_envs.cli.evaluate import Evaluate
 from omni_envs.cli.export import Export
 from omni_envs.cli.list import List
 from omni_envs.cli.retarget import Retarget
+from omni_envs.cli.skeleton import Skeleton
 from omni_envs.cli.view import View
 from omni_envs.errors import OmniEnvsError
 
@@ -24,6 +25,7 @@ Command = (
     | Annotated[Retarget, tyro.conf.subcommand("retarget")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
+    | Annotated[Skeleton, tyro.conf.subcommand("skeleton")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Export, tyro.conf.subcommand("export")]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import tyro
 
 from omni_envs.cli.output import show
+from omni_envs.cli.source_flags import SourceFlags
 from omni_envs.errors import InvalidOptionError
 
 
@@ -26,14 +27,7 @@ class Evaluate:
     robot: str = "g1"
     """Robot of a peer's motion."""
 
-    object: Path | None = None
-    """Mesh of the object, where the source does not carry it."""
-
-    terrain: Path | None = None
-    """Mesh of the terrain at human scale, where it does not lie beside the source."""
-
-    height: float | None = None
-    """Standing height of the human in metres, where the source does not tell it."""
+    read: SourceFlags = field(default_factory=SourceFlags)
 
     picture: Path | None = None
     """Draw the report of a single reference on a page (.png, .pdf or .svg)."""
@@ -45,16 +39,11 @@ class Evaluate:
     """Print JSON: one object per file, in a list if there are several files."""
 
     def run(self) -> None:  # noqa: D102
-        from omni_envs.demonstrations import load_demonstration
         from omni_envs.references import evaluate_reference, open_reference, report_picture
 
         if self.picture is not None and len(self.references) != 1:
             raise InvalidOptionError("--picture: draws one reference; give a single file.")
-        demonstration = None
-        if self.source is not None:
-            demonstration = load_demonstration(
-                self.source, object_mesh=self.object, terrain_mesh=self.terrain, height=self.height
-            )
+        demonstration = None if self.source is None else self.read.load(self.source)
         rows = []
         for path in self.references:
             reference = open_reference(path, self.robot, demonstration)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 import tyro
 
 from omni_envs.cli.output import show
+from omni_envs.cli.source_flags import SourceFlags
 from omni_envs.errors import InvalidOptionError, OmniEnvsError
 
 
@@ -26,14 +27,7 @@ class Retarget:
     robot: str = "g1"
     """Name of the robot."""
 
-    object: Path | None = None
-    """Mesh of the object, where the source does not carry it."""
-
-    terrain: Path | None = None
-    """Mesh of the terrain at human scale."""
-
-    height: float | None = None
-    """Standing height of the human in metres, where the source does not tell it."""
+    read: SourceFlags = field(default_factory=SourceFlags)
 
     fps: float = 50.0
     """Frames per second of the reference."""
@@ -54,7 +48,6 @@ class Retarget:
     """Print JSON: one object, or a list if there are several sources."""
 
     def run(self) -> None:  # noqa: D102
-        from omni_envs.demonstrations import load_demonstration
         from omni_envs.progress import progress_bar
         from omni_envs.references import make_reference, make_references
         from omni_envs.retargeting import RetargetOptions
@@ -67,12 +60,7 @@ class Retarget:
             raise InvalidOptionError(
                 f"--out {self.out}: must end in .npz; got {self.out.suffix!r}."
             )
-        demonstrations = [
-            load_demonstration(
-                source, object_mesh=self.object, terrain_mesh=self.terrain, height=self.height
-            )
-            for source in self.source
-        ]
+        demonstrations = [self.read.load(source) for source in self.source]
         names = [d.name for d in demonstrations]
         if len(set(names)) < len(names):
             raise InvalidOptionError(f"--out: sources of equal name would overwrite: {names}.")

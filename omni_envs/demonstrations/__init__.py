@@ -5,6 +5,7 @@ from omni_envs.demonstrations.bvh_source import load_bvh
 from omni_envs.demonstrations.contact import object_contacts, terrain_contacts
 from omni_envs.demonstrations.deepmimic import load_deepmimic
 from omni_envs.demonstrations.demonstration import Demonstration
+from omni_envs.demonstrations.inspection import Inspection, inspect_recording
 from omni_envs.demonstrations.intermimic import load_intermimic
 from omni_envs.demonstrations.joint_arrays import load_joint_array
 from omni_envs.demonstrations.load import load_demonstration
@@ -29,6 +30,7 @@ __all__ = [
     "SMPLH",
     "STANCE_MODES",
     "Demonstration",
+    "Inspection",
     "Skeleton",
     "SkeletonMap",
     "SourceMotion",
@@ -39,6 +41,7 @@ __all__ = [
     "builtin_demonstration",
     "builtin_names",
     "closest_points",
+    "inspect_recording",
     "load_bvh",
     "load_deepmimic",
     "load_demonstration",

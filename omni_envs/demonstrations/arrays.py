@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Collection
@@ -20,6 +21,7 @@ _MAGIC = {b"PK\x03\x04": "a .npz archive", b"\x80": "a pickle", b"\x93NUMPY": "a
 _UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, SyntaxError,
     TypeError, AttributeError, zipfile.BadZipFile, zlib.error, MemoryError, OverflowError,
+    tokenize.TokenError,  # of headers whose brackets stay open
 )  # fmt: skip
 
 

@@ -58,7 +58,8 @@ def load_joint_array(
     """
     options = SourceOptions() if options is None else options
     recording, rows, arrays = _read(Path(path), options)
-    recording, joints = _named(recording, options)
+    recording = name_joints(recording, options)
+    joints = map_joints(recording, options)
     scene, poses = None, arrays.get("object_poses")
     if poses is not None:
         scene, poses = _object(recording, rows, poses, object_mesh)
@@ -121,12 +122,17 @@ def _read(path: Path, options: SourceOptions) -> tuple[Recording, slice, dict[st
     return Recording(path, names, kept, kept_fps(fps)), rows, arrays
 
 
-def _named(recording: Recording, options: SourceOptions) -> tuple[Recording, SkeletonMap]:
+def name_joints(recording: Recording, options: SourceOptions) -> Recording:
+    """Names the joints of an array without names, by the skeleton given or the one that fits.
+
+    Raises:
+        FileFormatError: No known order fits, or the one given has another number of joints.
+    """
     if recording.joint_names:
-        return recording, map_joints(recording, options)
+        return recording
     joints = _nameless(recording, options)
     assert joints.joint_names is not None
-    return replace(recording, joint_names=joints.joint_names), joints
+    return replace(recording, joint_names=joints.joint_names)
 
 
 def _names(path: Path, arrays: dict[str, np.ndarray], joints: int) -> tuple[str, ...]:

@@ -91,7 +91,8 @@ def guess_skeleton(recording: Recording) -> Guess:
     table: dict[str, int] = {}
     scores: dict[str, float] = {}
     pairs: dict[tuple[str, ...], tuple[_Chain, _Chain]] = {}
-    for limb in (_LEG, _ARM):
+    limbs: tuple[tuple[str, ...], ...] = (_LEG, _ARM)
+    for limb in limbs:
         pair = _pair(limb, parents, stems, sides, places)
         if pair is None:
             found = ", ".join(names)[:200]

@@ -10,6 +10,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tokenize import TokenError
 
 import numpy as np
 
@@ -95,7 +96,7 @@ def read_npz(path: str | Path, *, checked: bool = True) -> dict[str, np.ndarray]
             arrays = {name: file[name] for name in file.files}
     except (OSError, ValueError, EOFError, KeyError, NotImplementedError) as error:
         raise FileFormatError(path, "file", "a complete .npz archive", _short(error)) from error
-    except (zipfile.BadZipFile, zlib.error, SyntaxError, MemoryError) as error:
+    except (zipfile.BadZipFile, zlib.error, SyntaxError, TokenError, MemoryError) as error:
         raise FileFormatError(path, "file", "a complete .npz archive", _short(error)) from error
     if checked:
         stored = arrays.pop(DIGEST, None)
