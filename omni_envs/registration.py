@@ -16,7 +16,7 @@ class EnvId:
     Attributes:
         robot: Name of the robot.
         robot_label: The robot's name in the id.
-        task: Name of the task: the built-in demonstration that is tracked by default.
+        task: Name of the task, see ``omni_envs.envs.tasks``.
         task_label: The task's name in the id.
         version: Version of the environment.
     """
@@ -33,7 +33,14 @@ class EnvId:
         return f"{NAMESPACE}/{self.robot_label}{self.task_label}-v{self.version}"
 
 
-ENVIRONMENTS = (EnvId("g1", "G1", "box_carry", "BoxCarry"),)
+_ROBOTS = {"g1": "G1", "h1": "H1", "t1": "T1"}
+_TASKS = {"box_carry": "BoxCarry", "climb": "Climb", "track": "Track"}
+
+ENVIRONMENTS = tuple(
+    EnvId(robot, robot_label, task, task_label)
+    for robot, robot_label in _ROBOTS.items()
+    for task, task_label in _TASKS.items()
+)
 """Every environment that the package registers."""
 
 

@@ -6,20 +6,33 @@ from gymnasium.envs.registration import EnvSpec
 from omni_envs import registration
 from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.references import reference_from_qpos
-from omni_envs.robots import G1, robot_names
+from omni_envs.robots import get_robot, robot_names
 
 registration.register_all()
 
 
 @pytest.fixture(scope="module")
-def reference_file(tmp_path_factory):
-    qpos = np.tile(G1.default_qpos, (30, 1))
-    path = tmp_path_factory.mktemp("reference") / "stand.npz"
-    return str(reference_from_qpos(G1, 50.0, qpos).save(path))
+def reference_files(tmp_path_factory):
+    """Robot to a file in which it stands."""
+    folder = tmp_path_factory.mktemp("reference")
+    files = {}
+    for name in ("g1", "h1", "t1"):
+        robot = get_robot(name)
+        reference = reference_from_qpos(robot, 50.0, np.tile(robot.default_qpos, (30, 1)))
+        files[name] = str(reference.save(folder / f"{name}.npz"))
+    return files
+
+
+@pytest.fixture
+def reference_file(reference_files):
+    return reference_files["g1"]
 
 
 def test_ids():
-    assert [e.id for e in registration.ENVIRONMENTS] == ["OmniEnvs/G1BoxCarry-v0"]
+    tasks = ("BoxCarry", "Climb", "Track")
+    assert [e.id for e in registration.ENVIRONMENTS] == [
+        f"OmniEnvs/{robot}{task}-v0" for robot in ("G1", "H1", "T1") for task in tasks
+    ]
     for entry in registration.ENVIRONMENTS:
         assert entry.robot in robot_names()
         spec = gym.spec(entry.id)
@@ -35,10 +48,10 @@ def test_registering_twice_changes_nothing():
 
 
 @pytest.mark.parametrize("entry", registration.ENVIRONMENTS, ids=lambda e: e.id)
-def test_a_spec_with_options_survives_json(entry, reference_file):
+def test_a_spec_with_options_survives_json(entry, reference_files):
     env = gym.make(
         entry.id,
-        reference=reference_file,
+        reference=reference_files[entry.robot],
         preset="beyondmimic",
         reward={"body_position": {"weight": 2.0}},
         randomization={"push": {"interval": [2, 4]}},
@@ -63,7 +76,9 @@ def test_unknown_id():
         gym.make("OmniEnvs/G1Juggle-v0")
     from omni_envs.benchmarks.step import bench_step
 
-    with pytest.raises(UnknownNameError, match="Valid: OmniEnvs/G1BoxCarry-v0"):
+    with pytest.raises(
+        UnknownNameError, match="Valid: OmniEnvs/G1BoxCarry-v0, OmniEnvs/G1Climb-v0"
+    ):
         bench_step("OmniEnvs/G1Juggle-v0")
 
 

@@ -24,6 +24,16 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     The code is that of ``OmniVectorEnv`` with one simulation; so are the options. All tables are
     for the G1 and the preset ``paper``; every number is an option, see ``omni_envs.tracking``.
 
+    **Tasks**: an id is ``OmniEnvs/<robot><task>-v0`` for the robots G1, H1 and T1. The default
+    reference is made from a built-in demonstration at the first make, and cached; ``reference=``
+    takes any other.
+
+    | Task     | Default reference                                         | Leans on           |
+    |----------|-----------------------------------------------------------|--------------------|
+    | BoxCarry | walks up, lifts a box, carries it, puts it down           | hands, feet        |
+    | Climb    | up a platform of 70 % of its height, and down again       | hands, knees, feet |
+    | Track    | none: ``reference=`` is needed                            | hands, feet        |
+
     **Action**: ``Box(-10, 10, (n,))``. The target of joint j is default_j + scale_j · a_j with
     scale = 0.25 · effort / kp, held for a control step of 0.02 s; with ``action={"mode":
     "residual"}`` the reference's joint position takes the place of the default, with

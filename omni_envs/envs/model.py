@@ -8,6 +8,7 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
+from omni_envs.errors import UnknownNameError
 from omni_envs.robots import Robot
 from omni_envs.scenes import OBJECT, Scene, build_spec
 from omni_envs.tracking.config import TrackingConfig
@@ -76,7 +77,10 @@ def build_model(robot: Robot, scene: Scene, config: TrackingConfig) -> EnvModel:
     else:
         if rule == "any":
             links = robot.contact_links
-            free = {b for link, bodies in links.items() if "knee" not in link for b in bodies}
+            for link in config.reward.may_touch:
+                if link not in links:
+                    raise UnknownNameError("reward.may_touch link", link, links)
+            free = {b for link in config.reward.may_touch for b in links[link]}
             watched = tuple(b for b in colliding if b not in free)
             samples = min(WBT_HISTORY, samples)
         else:

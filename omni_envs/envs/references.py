@@ -11,6 +11,7 @@ from typing import Union
 import numpy as np
 
 from omni_envs.demonstrations.demonstration import Demonstration
+from omni_envs.envs.tasks import Task
 from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import progress_bar
 from omni_envs.references import Reference, open_reference
@@ -23,24 +24,29 @@ from (and cache)."""
 
 
 def resolve_references(
-    source: ReferenceLike | Sequence[ReferenceLike] | None, robot: Robot, task: str
+    source: ReferenceLike | Sequence[ReferenceLike] | None, robot: Robot, task: Task
 ) -> tuple[Reference, ...]:
     """Turns the option ``reference`` into references.
 
     Args:
         source: One or several; None takes the built-in demonstration of the task.
         robot: The robot.
-        task: Name of the task.
+        task: The task.
 
     Raises:
-        InvalidOptionError: Something else was given.
+        InvalidOptionError: Something else was given, or nothing to a task that needs a reference.
         FileFormatError: A file is missing or damaged.
         InvalidDataError: A file of another project has an object, and so needs its scene first.
     """
     if source is None:
         from omni_envs.demonstrations import builtin_demonstration
 
-        source = builtin_demonstration(task)
+        if task.demonstration is None:
+            raise InvalidOptionError(
+                f"reference: the task {task.name!r} tracks what it is given; name a reference file, "
+                "a Reference or a Demonstration."
+            )
+        source = builtin_demonstration(task.demonstration)
     if isinstance(source, str | Path | Reference | Demonstration):
         source = [source]
     if not isinstance(source, Sequence):

@@ -28,6 +28,7 @@ from omni_envs.envs.pictures import Pictures
 from omni_envs.envs.references import ReferenceLike, distinct_scenes, resolve_references
 from omni_envs.envs.simulation import Simulation
 from omni_envs.envs.task import TrackingTask
+from omni_envs.envs.tasks import get_task
 from omni_envs.envs.variants import ModelVariants
 from omni_envs.errors import InvalidDataError, InvalidOptionError, UnknownNameError
 from omni_envs.robots import Robot, get_robot
@@ -82,7 +83,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     Args:
         num_envs: N.
         robot: Name of the robot, or the robot.
-        task: Task whose built-in demonstration is the default reference.
+        task: ``"box_carry"``, ``"climb"``, ``"crawl"`` or ``"track"``; all but the last have a
+            built-in demonstration as the default reference.
         reference: A reference file, a ``Reference``, a ``Demonstration``, or a list of these.
         preset: ``"paper"`` or ``"beyondmimic"``.
         anchor: See ``TrackingConfig``; as all options down to ``physics``, where None keeps the
@@ -139,8 +141,10 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             if value < least:
                 raise InvalidOptionError(f"{name} must be at least {least}; got {value}.")
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
+        chosen = get_task(task)
         self.config = config = make_config(
             preset,
+            chosen.changes,
             anchor=anchor,
             reward=reward,
             termination=termination,
@@ -162,7 +166,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
                 f"render_mode must be None or 'rgb_array'; got {render_mode!r}."
             )
         self.render_mode = render_mode
-        self.references = resolve_references(reference, self.robot, task)
+        self.references = resolve_references(reference, self.robot, chosen)
         mode = config.action.mode
         self.action_targets = (
             None if mode == "default" else action_targets(self.robot, self.references, mode)

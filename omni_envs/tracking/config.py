@@ -68,6 +68,8 @@ class RewardConfig:
         contact_rule: ``"self"`` counts bodies with self-collision (OmniRetarget), ``"any"`` bodies
             but feet and hands with any contact (BeyondMimic), ``"substeps"`` physics steps with
             self-collision of any body (mjlab).
+        may_touch: Links whose contacts the rule ``"any"`` does not count. Tasks that lean on their
+            knees add these.
         contact_force: Smallest force that counts, N.
         no_orientation: Bodies left out of the orientation term (the ankles, for a wall flip).
     """
@@ -85,6 +87,7 @@ class RewardConfig:
     soft_limit: float = 0.9
     contact: float = -0.1
     contact_rule: Literal["self", "any", "substeps"] = "self"
+    may_touch: tuple[str, ...] = ("left_hand", "right_hand", "left_foot", "right_foot")
     contact_force: float = 1.0
     no_orientation: tuple[str, ...] = ()
 
@@ -386,11 +389,14 @@ OPTIONS = tuple(f.name for f in fields(TrackingConfig))
 """Names of the option groups."""
 
 
-def make_config(preset: str = "paper", **options: Any) -> TrackingConfig:
+def make_config(
+    preset: str = "paper", task: Mapping[str, Any] | None = None, **options: Any
+) -> TrackingConfig:
     """Builds a task from a preset and options.
 
     Args:
         preset: A name of ``PRESETS``.
+        task: What the task changes in the preset, before the options.
         **options: Fields of ``TrackingConfig``: dataclasses, mappings of what differs from
             the preset,
             or None for no difference. ``physics`` may be a name of ``PHYSICS_PRESETS`` too.
@@ -407,4 +413,4 @@ def make_config(preset: str = "paper", **options: Any) -> TrackingConfig:
         if physics not in PHYSICS_PRESETS:
             raise UnknownNameError("physics preset", physics, PHYSICS_PRESETS)
         given["physics"] = PHYSICS_PRESETS[physics]
-    return override(PRESETS[preset], given, "environment")
+    return override(override(PRESETS[preset], task, "task"), given, "environment")
