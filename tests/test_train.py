@@ -48,10 +48,12 @@ def _words(out: Path, reference: Path, *more: str) -> list[str]:
     ]  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def run(reference, tmp_path_factory) -> Path:
+@pytest.fixture(scope="module", params=train.PACKAGES)
+def run(request, reference, tmp_path_factory) -> Path:
+    """A run of each trainer: what follows does not tell them apart."""
+    pytest.importorskip(train.PACKAGES[request.param][0])
     out = tmp_path_factory.mktemp("run") / "bend"
-    assert train.main(_words(out, reference, "--json")) == 0
+    assert train.main(_words(out, reference, "--json", "--trainer", request.param)) == 0
     return out
 
 

@@ -24,6 +24,12 @@ def test_training_names_the_extra(monkeypatch, module):
         _import_without(monkeypatch, "stable_baselines3", f"omni_envs.training.{module}")
 
 
+@pytest.mark.parametrize("module", ["env", "network", "ppo", "learner"])
+def test_training_with_torchrl_names_the_extra(monkeypatch, module):
+    with pytest.raises(MissingDependencyError, match=r"torchrl.*omni-envs\[torchrl\]"):
+        _import_without(monkeypatch, "torchrl", f"omni_envs.training.torchrl_{module}")
+
+
 @pytest.mark.parametrize("module", ["checkpoint", "network"])
 def test_networks_name_the_extra(monkeypatch, module):
     with pytest.raises(MissingDependencyError, match=r"torch.*omni-envs\[sb3\]"):
