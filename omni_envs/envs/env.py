@@ -39,6 +39,38 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     "residual"}`` the reference's joint position takes the place of the default, with
     ``"feedforward"`` a position ahead of it that makes up for damping and load.
 
+    | Index | Joint                | Default (rad) | Scale (rad) | Effort (N m) |
+    |-------|----------------------|---------------|-------------|--------------|
+    | 0     | left_hip_pitch       | -0.312        | 0.548       | 88           |
+    | 1     | left_hip_roll        | 0             | 0.351       | 139          |
+    | 2     | left_hip_yaw         | 0             | 0.548       | 88           |
+    | 3     | left_knee            | 0.669         | 0.351       | 139          |
+    | 4     | left_ankle_pitch     | -0.363        | 0.439       | 50           |
+    | 5     | left_ankle_roll      | 0             | 0.439       | 50           |
+    | 6     | right_hip_pitch      | -0.312        | 0.548       | 88           |
+    | 7     | right_hip_roll       | 0             | 0.351       | 139          |
+    | 8     | right_hip_yaw        | 0             | 0.548       | 88           |
+    | 9     | right_knee           | 0.669         | 0.351       | 139          |
+    | 10    | right_ankle_pitch    | -0.363        | 0.439       | 50           |
+    | 11    | right_ankle_roll     | 0             | 0.439       | 50           |
+    | 12    | waist_yaw            | 0             | 0.548       | 88           |
+    | 13    | waist_roll           | 0             | 0.439       | 50           |
+    | 14    | waist_pitch          | 0             | 0.439       | 50           |
+    | 15    | left_shoulder_pitch  | 0.2           | 0.439       | 25           |
+    | 16    | left_shoulder_roll   | 0.2           | 0.439       | 25           |
+    | 17    | left_shoulder_yaw    | 0             | 0.439       | 25           |
+    | 18    | left_elbow           | 0.6           | 0.439       | 25           |
+    | 19    | left_wrist_roll      | 0             | 0.439       | 25           |
+    | 20    | left_wrist_pitch     | 0             | 0.075       | 5            |
+    | 21    | left_wrist_yaw       | 0             | 0.075       | 5            |
+    | 22    | right_shoulder_pitch | 0.2           | 0.439       | 25           |
+    | 23    | right_shoulder_roll  | -0.2          | 0.439       | 25           |
+    | 24    | right_shoulder_yaw   | 0             | 0.439       | 25           |
+    | 25    | right_elbow          | 0.6           | 0.439       | 25           |
+    | 26    | right_wrist_roll     | 0             | 0.439       | 25           |
+    | 27    | right_wrist_pitch    | 0             | 0.075       | 5            |
+    | 28    | right_wrist_yaw      | 0             | 0.075       | 5            |
+
     **Observation**: ``Box(-inf, inf, (160,))``; without state estimation the terms
     ``motion_anchor_pos_b`` and ``base_lin_vel`` are absent, 154 entries. "_b" is the frame of the
     robot's anchor body, orientations are the first two columns of a rotation matrix by rows, noise
@@ -101,9 +133,25 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     **Start**: in a frame of the reference, disturbed, see ``reset``. The frame after it is the
     first to be tracked. ``reset(options={"motion": m, "frame": k})`` starts in a given frame.
 
-    **Info**: ``reward/<term>`` the parts of the reward, ``error/<term>`` the errors (m, rad, m/s,
-    rad/s), ``terminated/<test>``, ``diverged``, and ``motion`` and ``frame`` of the frame to be
-    tracked next.
+    **Info**:
+
+    | Key                         | Unit  | Meaning                                          |
+    |-----------------------------|-------|--------------------------------------------------|
+    | reward/<term>               | –     | weighted term of the reward, times 0.02 s        |
+    | error/anchor_position       | m     | distance of the anchor from the reference's      |
+    | error/anchor_orientation    | rad   | angle between them                               |
+    | error/body_position         | m     | distance of the tracked bodies, root mean square |
+    | error/body_orientation      | rad   | angle between them, root mean square             |
+    | error/body_linear_velocity  | m/s   | their velocities' difference, root mean square   |
+    | error/body_angular_velocity | rad/s | their rotations' difference, root mean square    |
+    | error/object_position       | m     | distance of the object from the reference's      |
+    | error/object_orientation    | rad   | angle between them                               |
+    | terminated/<test>           | bool  | test was hit: the first four above               |
+    | diverged                    | bool  | simulation exploded                              |
+    | motion                      | –     | motion that is tracked next, in the order given  |
+    | frame                       | –     | its frame that is tracked next                   |
+
+    Terms and tests that an option switches off, and those of the object without one, are absent.
 
     Version history:
         v0: First version.

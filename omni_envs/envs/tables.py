@@ -10,12 +10,51 @@ from omni_envs.tracking.observations import ObservationTerm, critic_layout, poli
 from omni_envs.tracking.rewards import PENALTY_TERMS, TRACKING_TERMS
 
 _ERROR_UNITS = ("m", "rad", "m", "rad", "m/s", "rad/s", "m", "rad")
+_ERRORS = (
+    "distance of the anchor from the reference's",
+    "angle between them",
+    "distance of the tracked bodies, root mean square",
+    "angle between them, root mean square",
+    "their velocities' difference, root mean square",
+    "their rotations' difference, root mean square",
+    "distance of the object from the reference's",
+    "angle between them",
+)
 
 
 def observation_table(robot: Robot = G1, preset: str = "paper") -> str:
     """Returns the policy's observation: index, name, noise, unit, meaning."""
     layout = policy_layout(PRESETS[preset].observation, robot.num_joints)
     return _observation_table(layout.terms)
+
+
+def action_table(robot: Robot = G1) -> str:
+    """Returns the joints: index, name, default position, what an action of 1 adds, effort limit."""
+    scale = robot.action_scale
+    rows = [
+        (
+            f"{i}",
+            name.removesuffix("_joint"),
+            f"{robot.default_joint_array[i]:g}",
+            f"{scale[i]:.3f}",
+            f"{robot.actuators[i].effort:g}",
+        )
+        for i, name in enumerate(robot.joint_names)
+    ]
+    return _table(("Index", "Joint", "Default (rad)", "Scale (rad)", "Effort (N m)"), rows)
+
+
+def info_table() -> str:
+    """Returns what the infos of a step hold: key, unit, meaning."""
+    rows = [
+        ("reward/<term>", "–", "weighted term of the reward, times 0.02 s"),
+        *zip([f"error/{n}" for n in TRACKING_TERMS], _ERROR_UNITS, _ERRORS, strict=True),
+        ("terminated/<test>", "bool", "test was hit: the first four above"),
+        ("diverged", "bool", "simulation exploded"),
+        ("motion", "–", "motion that is tracked next, in the order given"),
+        ("frame", "–", "its frame that is tracked next"),
+    ]
+    return _table(("Key", "Unit", "Meaning"), rows)
 
 
 def critic_table(robot: Robot = G1) -> str:

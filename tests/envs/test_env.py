@@ -7,7 +7,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from omni_envs import registration
-from omni_envs.envs import OmniEnv
+from omni_envs.envs import OmniEnv, tables
 from omni_envs.errors import InvalidDataError, InvalidOptionError
 from omni_envs.references import reference_from_qpos
 from omni_envs.robots import get_robot
@@ -98,15 +98,42 @@ def test_gym_make_takes_options_and_truncates(reference_file):
 
 def test_figures_of_the_docstring(env):
     """The tables are generated from the code, so they cannot be wrong."""
-    from omni_envs.envs.tables import (
-        critic_table,
-        observation_table,
-        reward_table,
-        termination_table,
-    )
-
     text = OmniEnv.__doc__
-    for table in (observation_table, critic_table, reward_table, termination_table):
+    for table in (
+        tables.action_table,
+        tables.observation_table,
+        tables.critic_table,
+        tables.reward_table,
+        tables.termination_table,
+        tables.info_table,
+    ):
         rows = [re.escape(row.strip()) for row in table().splitlines()]
         assert len(rows) > 5
         assert re.search(r"\s*".join(rows), text), table.__name__
+
+
+def _column(table: str, index: int = 0) -> list[str]:
+    return [row.split("|")[index + 1].strip() for row in table.splitlines()[2:]]
+
+
+def test_the_table_of_infos_names_every_info(env):
+    env.reset(seed=0)
+    infos = set(env.step(np.zeros(29))[4])
+    documented = set()
+    for key in _column(tables.info_table()):
+        names = {
+            "reward/<term>": _column(tables.reward_table()),
+            "terminated/<test>": _column(tables.termination_table())[:4],
+        }.get(key, [key])
+        documented |= {re.sub("<.*>", "", key) + n if "<" in key else n for n in names}
+    assert infos == documented
+
+
+def test_the_table_of_actions_is_what_actions_do(env):
+    table = tables.action_table()
+    assert _column(table, 1) == [n.removesuffix("_joint") for n in env.robot.joint_names]
+    env = OmniEnv(reference=env.references[0], randomization={"joint_default": 0.0})
+    env.reset(seed=0)
+    env.step(np.ones(29))
+    target = np.array(_column(table, 2), float) + np.array(_column(table, 3), float)
+    np.testing.assert_allclose(env.simulation.ctrl[0], target, atol=5e-4)
