@@ -139,7 +139,7 @@ def read_bvh(path: str | Path, rows: Callable[[int, float], slice] | None = None
         if not channels:
             raise FileFormatError(path, "CHANNELS", "at least one in the hierarchy", "none")
         rest = text[header.end() :].encode()
-        values = _values(path, _numbers(path, rest, file), int(frames), channels, keep)
+        values = _values(path, _words(path, rest, file), int(frames), channels, keep)
     bad = ~np.isfinite(values).all(axis=1)
     if bad.any():
         frame = keep.start + keep.step * int(np.argmax(bad))
@@ -149,8 +149,8 @@ def read_bvh(path: str | Path, rows: Callable[[int, float], slice] | None = None
     return BvhMotion(joints, float(frame_time), values)
 
 
-def _numbers(path: Path, first: bytes, file: BinaryIO) -> Iterator[np.ndarray]:
-    """Yields the numbers that follow, a few megabytes of text at a time."""
+def _words(path: Path, first: bytes, file: BinaryIO) -> Iterator[list[bytes]]:
+    """Yields the words that follow, a few megabytes of text at a time."""
     chunk = first
     while chunk:
         more = file.read(_CHUNK_BYTES)
@@ -160,28 +160,30 @@ def _numbers(path: Path, first: bytes, file: BinaryIO) -> Iterator[np.ndarray]:
         chunk = chunk[cut:] + more
         if len(chunk) > 3 * _CHUNK_BYTES:
             raise FileFormatError(path, "MOTION", "numbers", "one word of several megabytes")
-        try:
-            yield np.array(words, dtype=float)
-        except ValueError as error:
-            raise FileFormatError(path, "MOTION", "numbers", str(error)[:120]) from error
+        yield words
 
 
 def _values(
-    path: Path, numbers: Iterator[np.ndarray], frames: int, channels: int, keep: slice
+    path: Path, stream: Iterator[list[bytes]], frames: int, channels: int, keep: slice
 ) -> np.ndarray:
-    """Picks the rows to keep from the stream of all numbers."""
+    """Picks the rows to keep from the stream of all words; those before are only counted."""
     kept = np.empty((len(range(frames)[keep]), channels))
-    done, pending = 0, np.empty(0)  # whole rows seen, numbers of a row that is not yet complete
-    total = 0
-    for part in numbers:
+    done, total = 0, 0  # whole rows and words seen
+    pending: list[bytes] = []  # words of a row that is not yet complete
+    for part in stream:
         total += len(part)
-        pending = np.concatenate([pending, part])
-        whole = len(pending) // channels
-        rows = pending[: whole * channels].reshape(whole, channels)
-        index = np.arange(done, min(done + whole, keep.stop))
-        index = index[(index >= keep.start) & ((index - keep.start) % keep.step == 0)]
-        kept[(index - keep.start) // keep.step] = rows[index - done]
-        done, pending = done + whole, pending[whole * channels :]
+        words = pending + part
+        whole = len(words) // channels
+        pending = words[whole * channels :]
+        if done + whole > keep.start:
+            try:
+                numbers = np.array(words[: whole * channels], dtype=float)
+            except ValueError as error:
+                raise FileFormatError(path, "MOTION", "numbers", str(error)[:120]) from error
+            index = np.arange(max(done, keep.start), min(done + whole, keep.stop))
+            index = index[(index - keep.start) % keep.step == 0]
+            kept[(index - keep.start) // keep.step] = numbers.reshape(whole, channels)[index - done]
+        done += whole
         if keep.stop < frames and done >= keep.stop:
             return kept
     if total != frames * channels:

@@ -39,3 +39,26 @@ def test_too_little_ground_or_a_true_slope_is_left_alone(length, slope):
 def test_a_short_clip_is_left_alone():
     toes = np.zeros((3, 2, 3))
     assert level_floor(toes, toes, 30.0) is toes
+
+
+def test_unrecorded_steps_are_not_a_slope():
+    """Someone walks onto a box: a plane through the footholds would tilt everything else."""
+    frames = 400
+    t = np.arange(frames)
+    toes = np.zeros((frames, 2, 3))
+    for foot in range(2):
+        step = (t + 20 * foot) // 40
+        toes[:, foot, 0] = 0.5 * step  # a new foothold every 40 frames
+        toes[:, foot, 2] = np.where(step >= 7, 0.2, 0.0)
+    positions = toes.copy()
+    np.testing.assert_array_equal(level_floor(positions, toes, 30.0), positions)
+    toes[..., 2] = 0.01 * toes[..., 0]  # a tilt, and only that, goes
+    levelled = level_floor(toes, toes, 30.0)
+    assert np.ptp(levelled[..., 2]) < 1e-6
+
+
+def test_one_foot_that_never_stands():
+    frames = 60
+    toes = np.zeros((frames, 2, 3))
+    toes[:, 0, 0] = np.arange(frames)
+    np.testing.assert_array_equal(level_floor(toes, toes, 30.0), toes)
