@@ -31,6 +31,7 @@ ORDER = (
     "viewer",
     "benchmarks",
     "demo",
+    "publish",
     "cli",
 )
 HEAVY = {

@@ -14,6 +14,7 @@ from omni_envs.cli.demo import Demo
 from omni_envs.cli.evaluate import Evaluate
 from omni_envs.cli.export import Export
 from omni_envs.cli.list import List
+from omni_envs.cli.publish import Publish
 from omni_envs.cli.retarget import Retarget
 from omni_envs.cli.skeleton import Skeleton
 from omni_envs.cli.view import View
@@ -30,6 +31,7 @@ Command = (
     | Annotated[Bench, tyro.conf.subcommand("bench")]
     | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Curves, tyro.conf.subcommand("curves")]
+    | Annotated[Publish, tyro.conf.subcommand("publish")]
 )
 
 

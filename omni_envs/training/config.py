@@ -150,12 +150,13 @@ class TrainConfig:
             raise InvalidOptionError(f"TrainConfig: {error}.") from error
 
     def command(self) -> str:
-        """Returns the command that repeats this run."""
+        """Returns the command that repeats this run: a recipe, and what differs from it."""
+        from omni_envs.training.recipes import RECIPES
+
         data = self.to_dict()
-        flags = {
+        flags: dict[str, Any] = {
             "env": self.env,
             "trainer": self.trainer,
-            "recipe": "published",
             "steps": self.steps,
             "time-limit": self.time_limit,
             "num-envs": self.num_envs,
@@ -166,8 +167,21 @@ class TrainConfig:
             "ppo": json.dumps(data["ppo"]),
             "out": self.out,
         }
-        words = [word for name, value in flags.items() for word in (f"--{name}", str(value))]
-        return shlex.join(["python", "train.py", *words])
+        name = "published"
+        for known, recipe in RECIPES.items():
+            more: dict[str, Any] = {
+                "trainer": self.trainer,
+                "seed": self.seed,
+                "time_limit": self.time_limit,
+            }
+            same = recipe.config(self.env, self.out, self.steps, **more).to_dict()
+            if all(same[key] == data[key] for key in _OF_A_RECIPE):
+                name = known
+                for key in _OF_A_RECIPE:
+                    del flags[key.replace("_", "-")]
+                break
+        words = [word for flag, value in flags.items() for word in (f"--{flag}", str(value))]
+        return shlex.join(["python", "train.py", "--recipe", name, *words])
 
     def save(self) -> Path:
         """Writes ``config.json`` into the run directory."""
@@ -191,6 +205,9 @@ class TrainConfig:
             return cls.from_dict({**data, "out": Path(run)})
         except (ValueError, TypeError) as error:
             raise FileFormatError(path, "content", "a TrainConfig as JSON", str(error)) from error
+
+
+_OF_A_RECIPE = ("num_envs", "env_options", "training_options", "ppo")
 
 
 def merged(options: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

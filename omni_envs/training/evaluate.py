@@ -19,6 +19,8 @@ from omni_envs.training.statistics import wilson_interval
 
 EVALUATION_FILE = "evaluation.json"
 WINDOW_SECONDS, WINDOWS = 3.0, 64
+CARRIED = 0.25
+"""Distance within which an object counts as carried, m."""
 UNCLIPPED = 1e3
 """Action limit of environments that a policy file acts in: clipping is part of the file."""
 
@@ -31,6 +33,8 @@ class Evaluation:
         success_rate: Share of episodes that hit no termination criterion, under the evaluation
             randomization.
         success_ci95: Its 95 % confidence interval (Wilson).
+        carried_rate: Share of episodes that succeed with the object never further than 0.25 m from
+            its reference, stricter than the task; None without an object.
         episodes: Number of episodes.
         episode_length_mean: Control steps.
         episode_length_possible: Control steps of a whole motion.
@@ -48,6 +52,7 @@ class Evaluation:
 
     success_rate: float
     success_ci95: tuple[float, float]
+    carried_rate: float | None
     episodes: int
     episode_length_mean: float
     episode_length_possible: int
@@ -165,6 +170,7 @@ def evaluate(
     return Evaluation(
         success_rate=successes / len(whole.lengths),
         success_ci95=wilson_interval(successes, len(whole.lengths)),
+        carried_rate=_carried(whole),
         episodes=len(whole.lengths),
         episode_length_mean=float(whole.lengths.mean()),
         episode_length_possible=max(r.num_frames for r in references) - 1,
@@ -178,6 +184,12 @@ def evaluate(
         steps=steps,
         seconds=seconds,
     )
+
+
+def _carried(episodes: Episodes) -> float | None:
+    if episodes.object_error is None:
+        return None
+    return float((~episodes.terminated & (episodes.object_error <= CARRIED)).mean())
 
 
 def _weighted(episodes: Episodes) -> float:

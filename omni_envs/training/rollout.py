@@ -11,9 +11,10 @@ from gymnasium.vector import VectorEnv
 
 from omni_envs.progress import ProgressCallback
 
-BODY_ERROR, FRAME = "error/body_position", "frame"
+BODY_ERROR, OBJECT_ERROR, FRAME = "error/body_position", "error/object_position", "frame"
 """Infos of the environment: distance of the tracked bodies from the re-aligned reference, root mean
-square over the bodies (N,), m; frame of the motion that is tracked next (N,)."""
+square over the bodies (N,), m; distance of the object from its reference (N,), m; frame of the
+motion that is tracked next (N,)."""
 
 
 class Policy(Protocol):
@@ -33,12 +34,14 @@ class Episodes:
         returns: (N,) undiscounted sum of rewards.
         terminated: (N,) whether a termination criterion was hit.
         body_error: (N,) mean over the episode of the distance of the tracked bodies, m.
+        object_error: (N,) largest distance of the object from its reference, m, or None without.
     """
 
     lengths: np.ndarray
     returns: np.ndarray
     terminated: np.ndarray
     body_error: np.ndarray
+    object_error: np.ndarray | None = None
 
 
 def play(
@@ -63,6 +66,7 @@ def play(
     n = env.num_envs
     lengths, alive = np.zeros(n, int), np.ones(n, bool)
     returns, errors, terminated = np.zeros(n), np.zeros(n), np.zeros(n, bool)
+    farthest, has_object = np.zeros(n), False
     observations, infos = env.reset(seed=seed, options=None if options is None else dict(options))
     while alive.any() and (max_steps is None or lengths.max() < max_steps):
         seen = observations["policy"] if isinstance(observations, Mapping) else observations
@@ -71,8 +75,12 @@ def play(
         lengths[alive] += 1
         returns[alive] += rewards[alive]
         errors[alive] += infos[BODY_ERROR][alive]
+        has_object = OBJECT_ERROR in infos
+        if has_object:
+            farthest[alive] = np.maximum(farthest, infos[OBJECT_ERROR])[alive]
         terminated |= alive & ended
         alive &= ~(ended | truncated)
         if progress is not None:
             progress(n - int(alive.sum()), n)
-    return Episodes(lengths, returns, terminated, errors / lengths)
+    objects = farthest if has_object else None
+    return Episodes(lengths, returns, terminated, errors / lengths, objects)

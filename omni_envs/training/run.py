@@ -101,8 +101,12 @@ def _train(
     start: Path | None,
     progress: bool | None,
 ) -> RunResult:
-    config.save()
     state = Checkpoint.load(start) if start else learner.state(0.0, [])
+    if not state.optimizer:
+        raise InvalidOptionError(
+            f"{config.out} holds a published policy, without what a training needs to go on."
+        )
+    config.save()
     if start:
         learner.restore(state)
     else:

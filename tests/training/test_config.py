@@ -1,11 +1,13 @@
 import dataclasses
 import json
+import shlex
 from pathlib import Path
 
 import pytest
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.config import PPOConfig, TrainConfig, merged
+from omni_envs.training.recipes import RECIPES
 
 
 def _config(tmp_path: Path) -> TrainConfig:
@@ -68,6 +70,19 @@ def test_bad_values_are_one_clear_error(tmp_path, change, message):
     data = {**_config(tmp_path).to_dict(), **change}
     with pytest.raises(InvalidOptionError, match=message):
         TrainConfig.from_dict(data)
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_the_command_is_the_shortest_that_repeats_the_run(tmp_path, recipe):
+    config = RECIPES[recipe].config("X", tmp_path, 7, seed=3)
+    words = shlex.split(config.command())
+    assert words[words.index("--recipe") + 1] == recipe
+    assert "--ppo" not in words and "--num-envs" not in words
+    assert words[words.index("--seed") + 1] == "3"
+    changed = RECIPES[recipe].config("X", tmp_path, 7, num_envs=5)
+    words = shlex.split(changed.command())
+    assert words[words.index("--num-envs") + 1] == "5"
+    assert json.loads(words[words.index("--ppo") + 1]) == changed.to_dict()["ppo"]
 
 
 def test_options_are_merged_field_by_field(tmp_path):

@@ -36,6 +36,17 @@ def test_return_and_error_are_those_of_the_episode(chase):
     np.testing.assert_allclose(episodes.returns, 20 * np.exp(-10 * start**2))
 
 
+def test_the_largest_distance_of_the_object_is_kept(chase):
+    class WithObject(chase):
+        def step(self, actions):
+            *rest, infos = super().step(actions)
+            infos["error/object_position"] = np.where(self.time == 5, 0.4, 0.1)
+            return *rest, infos
+
+    assert play(chase(3), _still, seed=0).object_error is None
+    assert play(WithObject(3), _still, seed=0).object_error.tolist() == [0.4] * 3
+
+
 def test_a_window_ends_alive(chase):
     episodes = play(chase(3), _still, seed=0, max_steps=7)
     assert episodes.lengths.tolist() == [7, 7, 7] and not episodes.terminated.any()

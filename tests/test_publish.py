@@ -1,0 +1,101 @@
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("onnxruntime")
+pytest.importorskip("onnx")
+pytest.importorskip("imageio")
+pytest.importorskip("matplotlib")
+
+from omni_envs.cli import main
+from omni_envs.errors import InvalidOptionError
+from omni_envs.export import export_run
+from omni_envs.publish import CARD, STRIP, publish
+from omni_envs.training.config import TrainConfig
+from omni_envs.training.evaluate import evaluate_run
+from omni_envs.training.network_policy import find_checkpoint, load_actor
+from omni_envs.training.recipes import RECIPES
+from omni_envs.training.run import train
+
+
+@pytest.fixture(scope="module")
+def run(sway, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("publish")
+    reference = str(sway(12).save(folder / "motion.npz"))
+    config = RECIPES["small"].config(
+        "OmniEnvs/G1BoxCarry-v0",
+        folder / "run",
+        64,
+        num_envs=4,
+        num_threads=1,
+        env_options={"reference": reference},
+        ppo={"rollout_steps": 8, "hidden": (8,), "epochs": 1, "minibatches": 1},
+    )
+    train(config)
+    return config.out
+
+
+@pytest.fixture(scope="module")
+def folder(run, tmp_path_factory):
+    out = tmp_path_factory.mktemp("policies") / "sway"
+    publish(run, out, episodes=6)
+    return out
+
+
+def test_the_folder_holds_what_a_policy_needs(folder):
+    names = {p.name for p in folder.iterdir()}
+    assert names == {
+        CARD, STRIP, "checkpoints", "config.json", "curve.csv", "curve.png", "evaluation.json",
+        "policy.json", "policy.onnx",
+    }  # fmt: skip
+    figures = json.loads((folder / "evaluation.json").read_text())
+    card = (folder / CARD).read_text()
+    assert figures["episodes"] == 6 and figures["steps"] == 64
+    assert 0.0 <= figures["carried_rate"] <= figures["success_rate"]
+    assert f"**{figures['success_rate']:.1%}**" in card
+    config = TrainConfig.load(folder)
+    assert config.steps == 64  # those that it got, whatever was asked for
+    assert replace(config, out=Path("runs/sway")).command() in card and "Apache-2.0" in card
+    with (folder / "curve.csv").open() as file:
+        assert float(list(csv.DictReader(file))[-1]["steps"]) == 64
+
+
+def test_the_folder_is_a_run_without_the_optimiser(run, folder):
+    (checkpoint,) = (folder / "checkpoints").iterdir()
+    assert checkpoint.stat().st_size < 0.6 * find_checkpoint(run).stat().st_size
+    whole, slim = load_actor(find_checkpoint(run)), load_actor(find_checkpoint(folder))
+    for a, b in zip(whole.parameters(), slim.parameters(), strict=True):
+        np.testing.assert_array_equal(a.detach(), b.detach())
+    again = evaluate_run(folder)
+    published = json.loads((folder / "evaluation.json").read_text())
+    assert again.success_rate == published["success_rate"]
+    assert again.return_mean == pytest.approx(published["return_mean"])
+    assert export_run(folder)["parity_max_abs"] <= 1e-5
+
+
+def test_training_does_not_go_on_from_it(folder):
+    config = TrainConfig.load(folder)
+    before = (folder / "config.json").read_text()
+    with pytest.raises(InvalidOptionError, match="without what a training needs"):
+        train(config, resume=True)
+    assert (folder / "config.json").read_text() == before
+
+
+def test_a_policy_below_the_bar_is_not_published(run, tmp_path):
+    with pytest.raises(InvalidOptionError, match="below the 1\\.100 asked for"):
+        publish(run, tmp_path / "policy", episodes=2, least=1.1)
+    assert not (tmp_path / "policy").exists()
+
+
+def test_the_command_publishes(run, tmp_path, capsys):
+    out = tmp_path / "policy"
+    assert main(["publish", str(run), "--out", str(out), "--episodes", "2", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == 2
+    assert (out / CARD).is_file()
+    assert main(["publish", str(tmp_path / "none"), "--out", str(out)]) == 1
+    assert "config.json" in capsys.readouterr().err
