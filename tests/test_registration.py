@@ -2,11 +2,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import AutoresetMode
 
 from omni_envs import registration
 from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.references import reference_from_qpos
 from omni_envs.robots import get_robot, robot_names
+from omni_envs.tracking import PhysicsConfig, ResetConfig
 
 registration.register_all()
 
@@ -62,6 +64,31 @@ def test_a_spec_with_options_survives_json(entry, reference_files):
     assert again.unwrapped.config.randomization.push.interval == (2.0, 4.0)
     a, b = env.reset(seed=1)[0], again.reset(seed=1)[0]
     np.testing.assert_array_equal(a, b)
+
+
+def test_a_spec_with_dataclasses_survives_json(reference_file):
+    env = gym.make(
+        "OmniEnvs/G1Track-v0",
+        reference=reference_file,
+        reset=ResetConfig(noise=None),
+        physics=PhysicsConfig(timestep=0.01, substeps=2),
+    )
+    again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.config == env.unwrapped.config
+
+
+def test_a_spec_of_a_vector_environment_survives_json(reference_file):
+    env = gym.make_vec(
+        "OmniEnvs/G1Track-v0",
+        num_envs=2,
+        reference=reference_file,
+        autoreset_mode="DISABLED",
+        physics="fast",
+    )
+    again = gym.make_vec(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.config == env.unwrapped.config
+    assert again.num_envs == 2
+    assert again.metadata["autoreset_mode"] is AutoresetMode.DISABLED
 
 
 def test_make_vec_uses_the_native_vector_environment(reference_file):
