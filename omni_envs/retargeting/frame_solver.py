@@ -16,6 +16,7 @@ from omni_envs.retargeting.solver import StepSolver
 from omni_envs.retargeting.tasks import CostTask
 
 _DEEP = 5e-3  # m
+_EXACT = 0.3  # of the convergence: error of a prediction that leaves nothing to a further step
 
 
 @dataclass(frozen=True)
@@ -85,9 +86,11 @@ class FrameSolver:
         """
         configuration, soft, steps = self.configuration, False, 0
         configuration.update(q)
-        predicted = np.inf
+        predicted, inside, before_that = np.inf, False, np.zeros(configuration.model.nv)
         while steps < iterations:
             H, g, before = step_model(configuration, self.tasks)
+            if inside and abs(before - predicted) <= _EXACT * convergence * abs(predicted):
+                break
             lower, upper = step_bounds(configuration, self.bounds)
             rows = step_rows(configuration, self.row_limits)
             if fallback is not None and max(row_violations(rows)[1:]) > _DEEP:
@@ -99,7 +102,11 @@ class FrameSolver:
             dq, soft = self.solver(qp)
             configuration.update(configuration.step(dq))
             steps += 1
-            change = qp.decrease(dq)
+            change, norm = qp.decrease(dq), qp.norm(dq)
+            inside = not soft and norm < 0.99 * radius
+            if qp.metric @ (dq * before_that) < -0.5 * norm * qp.norm(before_that):
+                radius = 0.5 * norm  # it undid the step before that: no cycles
+            before_that = 0.0 * dq if soft else dq
             last, predicted = predicted, before + change
             small = min(abs(change), abs(predicted - last))
             if not soft and small <= convergence * abs(predicted):

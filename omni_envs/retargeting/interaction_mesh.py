@@ -19,12 +19,12 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting import kernels
 from omni_envs.retargeting.surface_points import SurfacePoints, surface_points
 from omni_envs.robots import KEYPOINTS
 
 _K = len(KEYPOINTS)
 _RIDGE = 1e-9
-_CHUNK = 64  # frames reduced at once: keeps the (chunk, V, V) matrices in cache and memory flat
 _EDGES = np.array([(i, j) for i in range(4) for j in range(4) if i != j])
 
 
@@ -50,16 +50,6 @@ class Connectivity:
 
     points: np.ndarray
     bits: np.ndarray
-
-    def laplacians(self, frames: slice) -> np.ndarray:
-        """(F, V, V) uniform Laplacian matrices; an isolated vertex gets a zero row."""
-        vertices = self.points.shape[1]
-        adjacency = np.unpackbits(self.bits[frames], axis=-1, count=vertices).astype(float)
-        degree = adjacency.sum(axis=-1, keepdims=True)
-        laplacian = adjacency / -np.maximum(degree, 1.0)
-        diagonal = np.arange(vertices)
-        laplacian[:, diagonal, diagonal] = degree[..., 0] > 0
-        return laplacian
 
 
 def connect(points: np.ndarray) -> Connectivity:
@@ -138,20 +128,8 @@ class InteractionMesh:
         surface = np.broadcast_to(points.source, (frames, *points.source.shape[-2:]))
         vertices = np.concatenate([local, surface], axis=1)
         connectivity = _connectivity(vertices / scale)
-        target = np.broadcast_to(points.target, (frames, *points.target.shape[-2:]))
-
-        moment = np.empty((frames, _K, _K))
-        linear = np.empty((frames, _K, 3))
-        rest = np.empty(frames)
-        for start in range(0, frames, _CHUNK):
-            part = slice(start, min(start + _CHUNK, frames))
-            laplacian = connectivity.laplacians(part)
-            keypoint_part = np.swapaxes(laplacian[:, :, :_K], 1, 2)
-            residual = laplacian[:, :, _K:] @ target[part] - laplacian @ vertices[part]
-            moment[part] = keypoint_part @ laplacian[:, :, :_K]
-            linear[part] = keypoint_part @ residual
-            rest[part] = np.einsum("tvd,tvd->t", residual, residual)
-
+        target = points.target.reshape(-1, *points.target.shape[-2:])
+        moment, linear, rest = kernels.reduced_energies(connectivity.bits, vertices, target, _K)
         factor = np.swapaxes(np.linalg.cholesky(moment + _RIDGE * np.eye(_K)), 1, 2)
         if target_poses is not None:
             linear = linear @ np.swapaxes(rotation_matrices(target_poses[:, 3:]), 1, 2)

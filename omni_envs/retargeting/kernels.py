@@ -203,3 +203,86 @@ def nearest_box(
             for k in range(3):
                 away[k] = R[3 * k] * local[0] + R[3 * k + 1] * local[1] + R[3 * k + 2] * local[2]
     return best, away, length
+
+
+@_compiled
+def reduced_energies(
+    adjacency: Array, source: Array, target: Array, keypoints: int
+) -> tuple[Array, Array, Array]:
+    """Deformation energies about the keypoints, the first vertices of a mesh per frame.
+
+    E(P) = tr(PᵀMP) + 2 tr(cᵀP) + e with M = L_kᵀL_k, c = L_kᵀr, e = ‖r‖², r = L_o P_o - L P_source.
+
+    Args:
+        adjacency: (T, V, ⌈V/8⌉) packed bits.
+        source: (T, V, 3) P_source.
+        target: (T or 1, V - K, 3) P_o.
+        keypoints: K.
+
+    Returns:
+        (T, K, K) M, (T, K, 3) c and (T,) e.
+    """
+    frames, vertices = source.shape[:2]
+    M = np.zeros((frames, keypoints, keypoints))
+    c, e = np.zeros((frames, keypoints, 3)), np.zeros(frames)
+    row, columns, r = np.empty(keypoints), np.empty(keypoints, np.int64), np.empty(3)
+    neighbours = np.empty(vertices, np.int64)
+    for t in range(frames):
+        surface = target[min(t, len(target) - 1)]
+        for i in range(vertices):
+            degree = 0
+            for j in range(vertices):
+                if adjacency[t, i, j >> 3] >> (7 - (j & 7)) & 1:
+                    neighbours[degree] = j
+                    degree += 1
+            if degree == 0:
+                continue
+            found = 0
+            for d in range(3):
+                r[d] = -source[t, i, d]
+            if i < keypoints:
+                columns[found], row[found] = i, 1.0
+                found += 1
+            else:
+                for d in range(3):
+                    r[d] += surface[i - keypoints, d]
+            for n in range(degree):
+                j = neighbours[n]
+                if j < keypoints:
+                    columns[found], row[found] = j, -1.0 / degree
+                    found += 1
+                for d in range(3):
+                    other = source[t, j, d]
+                    if j >= keypoints:
+                        other -= surface[j - keypoints, d]
+                    r[d] += other / degree
+            for d in range(3):
+                e[t] += r[d] * r[d]
+            for a in range(found):
+                for d in range(3):
+                    c[t, columns[a], d] += row[a] * r[d]
+                for b in range(found):
+                    M[t, columns[a], columns[b]] += row[a] * row[b]
+    return M, c, e
+
+
+@_compiled
+def farthest_points(points: Array, stretch: Array, count: int) -> Array:
+    """Indices of points, each the farthest from those chosen before it; the first is the first.
+
+    Args:
+        points: (N, 3).
+        stretch: (N,) factor on the distances of each point.
+        count: How many to choose.
+    """
+    chosen = np.zeros(count, np.int64)
+    distance = np.full(len(points), np.inf)
+    for i in range(1, count):
+        last, best = points[chosen[i - 1]], 0
+        for n in range(len(points)):
+            x, y, z = points[n, 0] - last[0], points[n, 1] - last[1], points[n, 2] - last[2]
+            distance[n] = min(distance[n], np.sqrt(x * x + y * y + z * z) * stretch[n])
+            if distance[n] > distance[best]:
+                best = n
+        chosen[i] = best
+    return chosen

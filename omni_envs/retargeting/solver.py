@@ -74,6 +74,8 @@ def _within(
             return trial
         if norm > qp.radius:
             low = damping
+            if damping > 5.0 * before[0] > scale and norm * before[1] > 0.999:
+                return None  # the shortest step that the rows leave is longer
         else:
             high = damping
         slope = (1.0 / norm - before[1]) / (damping - before[0])
@@ -91,6 +93,8 @@ def _program(qp: StepQP, damping: float) -> tuple[np.ndarray, ...]:
         H.flat[:: len(H) + 1] += damping * qp.metric
     upper = np.concatenate([qp.upper, qp.rows.upper])
     lower = np.concatenate([qp.lower, qp.rows.lower])
+    np.minimum(upper, 1e30, out=upper)  # DAQP's infinity
+    np.maximum(lower, -1e30, out=lower)
     return H, qp.g, np.ascontiguousarray(qp.rows.A), upper, lower
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting import kernels
 
 # Upward faces carry feet, hands and knees: they get this many times the points per area of others.
 _TOP_WEIGHT = 4.0
@@ -61,14 +62,7 @@ def _spread(surface: trimesh.Trimesh, count: int, top_weight: float) -> np.ndarr
     candidates = np.einsum("nk,nkd->nd", weights, corners)
     # Density goes with the inverse square of the spacing.
     stretch = np.where(normals[face, 2] > 0.7, np.sqrt(top_weight), 1.0)
-    chosen = np.empty(count, int)
-    chosen[0] = 0
-    distance = np.full(face.size, np.inf)
-    for i in range(1, count):
-        step = np.linalg.norm(candidates - candidates[chosen[i - 1]], axis=1) * stretch
-        np.minimum(distance, step, out=distance)
-        chosen[i] = int(np.argmax(distance))
-    return candidates[chosen]
+    return candidates[kernels.farthest_points(candidates, stretch, count)]
 
 
 def _ground(centres: np.ndarray, spacing: float) -> np.ndarray:

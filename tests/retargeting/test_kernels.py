@@ -61,3 +61,12 @@ def test_nearest_box():
         np.testing.assert_allclose(away, way, atol=1e-12)
     inside = kernels.nearest_box(centres, matrices.reshape(2, 9), geoms, half, radius, centres[0])
     assert inside[0] == 0 and inside[2] == 0.0 and not inside[1].any()
+
+
+def test_farthest_points():
+    points, stretch = rng.normal(size=(40, 3)), rng.uniform(1.0, 2.0, 40)
+    chosen = kernels.farthest_points(points, stretch, 12).tolist()
+    assert chosen[0] == 0 and len(set(chosen)) == 12
+    for i in range(1, 12):
+        apart = np.linalg.norm(points[:, None] - points[chosen[:i]], axis=2).min(axis=1) * stretch
+        assert apart[chosen[i]] == pytest.approx(apart.max())
