@@ -16,7 +16,7 @@ from omni_envs.retargeting.solver import StepSolver
 from omni_envs.retargeting.tasks import CostTask
 
 _DEEP = 5e-3  # m
-_EXACT = 0.3  # of the convergence: error of a prediction that leaves nothing to a further step
+_EXACT = 0.2  # of the convergence: error of a prediction that leaves nothing to a further step
 
 
 @dataclass(frozen=True)
