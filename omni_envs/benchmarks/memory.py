@@ -22,6 +22,15 @@ def peak_bytes() -> int | None:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
+def resident_bytes() -> int | None:
+    """Resident memory of now; None where the system does not tell."""
+    try:
+        with open("/proc/self/status") as status:
+            return next(int(row.split()[1]) * 1024 for row in status if row.startswith("VmRSS"))
+    except (OSError, StopIteration):
+        return None
+
+
 def reset_peak() -> int | None:
     """Forgets earlier peaks where the system can (Linux), and returns ``peak_bytes``.
 

@@ -13,7 +13,6 @@ from mujoco.batch import Batch
 
 import omni_envs
 from omni_envs import registration
-from omni_envs.benchmarks.memory import peak_bytes, reset_peak
 from omni_envs.envs import OmniVectorEnv
 from omni_envs.errors import UnknownNameError
 
@@ -53,26 +52,20 @@ def bench_step(
 
     Returns:
         ``steps_per_s`` and ``raw_steps_per_s`` (control steps, medians), ``ratio`` (median over the
-        pairs of slices), ``bytes_per_env`` (growth of the process's peak by making and
-        running the environment, None where the system does not tell), and the conditions.
+        pairs of slices), and the conditions.
     """
-    base = reset_peak()
-    started = time.perf_counter()
-    vector = _make(env, num_envs, num_threads, options)
-    construct = time.perf_counter() - started
+    vector = make_vector(env, num_envs, num_threads, options)
     rng = np.random.default_rng(seed)
     observations, _ = vector.reset(seed=seed)
     for _ in range(PAIRS):
-        observations = vector.step(_aim(vector, observations, rng))[0]
-    peak = peak_bytes()
-    memory = None if peak is None or base is None else round((peak - base) / num_envs)
+        observations = vector.step(aim(vector, observations, rng))[0]
     live = vector.simulation.batch
     raw = Batch(vector.simulation.model, num_envs, live.nthread)
     substeps = vector.config.physics.substeps
 
     def pair() -> tuple[float, float]:
         nonlocal observations
-        action = _aim(vector, observations, rng)
+        action = aim(vector, observations, rng)
         vector.simulation.copy_models_to(raw)
         for name in _STATE:
             raw.bind(name)[:] = live.bind(name)
@@ -87,8 +80,6 @@ def bench_step(
     figures = _measure(pair, num_envs, seconds)
     vector.close()
     return figures | {
-        "bytes_per_env": memory,
-        "construct_seconds": construct,
         "num_envs": num_envs,
         "num_threads": live.nthread,
         "version": omni_envs.__version__,
@@ -119,7 +110,7 @@ def bench_single(
 
     def pair() -> tuple[float, float]:
         nonlocal observation
-        action = _aim(vector, observation[None], rng)[0]
+        action = aim(vector, observation[None], rng)[0]
         for name in _STATE:
             getattr(data, name)[:] = simulation.batch.bind(name)[0]
         started = time.perf_counter()
@@ -177,8 +168,8 @@ def _measure(
     }
 
 
-def _aim(vector: OmniVectorEnv, observations: Any, rng: np.random.Generator) -> np.ndarray:
-    """Actions (N, n) whose joint targets are the reference's joint positions, with noise."""
+def aim(vector: OmniVectorEnv, observations: Any, rng: np.random.Generator) -> np.ndarray:
+    """Returns actions (N, n) that aim at the reference's joint positions, with noise."""
     joints = vector.robot.num_joints
     seen = observations["policy"] if isinstance(observations, dict) else observations
     noise = NOISE * rng.standard_normal((len(seen), joints))
@@ -189,7 +180,14 @@ def _aim(vector: OmniVectorEnv, observations: Any, rng: np.random.Generator) -> 
     return noise + offset / (vector.robot.action_scale * vector.config.action.scale)
 
 
-def _make(env: str, num_envs: int, num_threads: int, options: dict[str, Any]) -> OmniVectorEnv:
+def make_vector(
+    env: str, num_envs: int, num_threads: int, options: dict[str, Any]
+) -> OmniVectorEnv:
+    """Makes a vector environment of this package.
+
+    Raises:
+        UnknownNameError: The id is of another.
+    """
     registration.register_all()
     ids = [e.id for e in registration.ENVIRONMENTS]
     if env not in ids:

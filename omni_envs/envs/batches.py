@@ -30,6 +30,13 @@ def copied(observations: Observation) -> Observation:
     return observations.copy()
 
 
+def first_row(observations: Observation) -> Observation:
+    """Returns a copy of the first simulation's observation."""
+    if isinstance(observations, dict):
+        return {key: values[0].copy() for key, values in observations.items()}
+    return observations[0].copy()
+
+
 def empty_observations(num: int, policy: int, critic: int | None) -> Observation:
     """Returns room for N observations."""
     if critic is None:
@@ -42,7 +49,7 @@ def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Returns infos that every simulation has: each key with a mask ``_key`` of who has it."""
     infos: dict[str, Any] = dict(values)
     everyone = np.ones(len(next(iter(values.values()))), bool)
-    infos.update((f"_{key}", everyone) for key in values)
+    infos.update(dict.fromkeys([f"_{key}" for key in values], everyone))
     return infos
 
 

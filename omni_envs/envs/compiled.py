@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from omni_envs.envs.task import Judgement, TrackingTask
+from omni_envs.envs.task import TrackingTask
 from omni_envs.tracking import kernels
 from omni_envs.tracking.alignment import Bodies
 from omni_envs.tracking.motion import MotionLibrary
@@ -13,11 +15,30 @@ from omni_envs.tracking.randomization import start_widths, symmetric
 TESTS = ("anchor_height", "anchor_tilt", "end_effector_height", "object")
 
 
+class Judged(NamedTuple):
+    """What a control step was worth, for N simulations.
+
+    Attributes:
+        reward: (N,) sum of the terms.
+        terminated: (N,) whether any flag is set.
+        figures: (F, N) terms of the reward, then tracking errors: m, rad, m/s, rad/s.
+        flags: (5, N) the tests in the order of ``TESTS``, then whether the simulation diverged.
+    """
+
+    reward: np.ndarray
+    terminated: np.ndarray
+    figures: np.ndarray
+    flags: np.ndarray
+
+
 class CompiledTask:
     """Rewards, terminations, observations and start states of N simulations in few passes.
 
     Attributes:
         numbers: What the loops know of the configuration.
+        figures: Names of the rows of ``Judged.figures``, as in infos.
+        flags: Names of rows of ``Judged.flags``, as in infos, without tests that are switched off.
+        flag_rows: Their rows.
 
     Args:
         task: The task, names resolved.
@@ -28,7 +49,7 @@ class CompiledTask:
     def __init__(self, task: TrackingTask, library: MotionLibrary, samples: int) -> None:
         self.numbers = task.numbers(samples)
         self._table, self._at = library.table, library.at
-        self._terms, self._errors = task.terms, task.errors
+        self.figures = (*(f"reward/{n}" for n in task.terms), *(f"error/{n}" for n in task.errors))
         limits = task.config.termination
         configured = (
             limits.anchor_height is not None,
@@ -36,7 +57,8 @@ class CompiledTask:
             limits.end_effector_height is not None,
             library.has_object,
         )
-        self._tests = [(k, name) for k, name in enumerate(TESTS) if configured[k]]
+        self.flag_rows = [*(k for k, there in enumerate(configured) if there), len(TESTS)]
+        self.flags = (*(f"terminated/{TESTS[k]}" for k in self.flag_rows[:-1]), "diverged")
         noise = task.config.reset.noise
         joints = len(task.soft_lower)
         self._widths = None if noise is None else start_widths(noise, joints)
@@ -53,7 +75,8 @@ class CompiledTask:
         previous_action: np.ndarray,
         history: np.ndarray,
         object_active: bool,
-    ) -> Judgement:
+        diverged: np.ndarray,
+    ) -> Judged:
         """Compares the states after a control step with the frames that the policy saw.
 
         Args:
@@ -64,10 +87,15 @@ class CompiledTask:
             previous_action: (N, n).
             history: (N, nhistory) of the contact sensors.
             object_active: Whether losing the object ends an episode.
+            diverged: (N,) simulations that get no reward.
         """
         num = len(rows)
-        terms, errors = np.empty((len(self._terms), num)), np.empty((len(self._errors), num))
-        tests, reward = np.empty((len(TESTS), num), bool), np.empty(num)
+        judged = Judged(
+            np.empty(num),
+            np.empty(num, bool),
+            np.empty((len(self.figures), num)),
+            np.empty((len(TESTS) + 1, num), bool),
+        )
         kernels.judge(
             self.numbers,
             self._at,
@@ -79,17 +107,13 @@ class CompiledTask:
             previous_action,
             history,
             object_active,
-            terms,
-            errors,
-            tests,
-            reward,
+            diverged,
+            judged.figures,
+            judged.flags,
+            judged.reward,
+            judged.terminated,
         )
-        return Judgement(
-            reward,
-            dict(zip(self._terms, terms, strict=True)),
-            dict(zip(self._errors, errors, strict=True)),
-            {name: tests[k] for k, name in self._tests},
-        )
+        return judged
 
     def observe(
         self,

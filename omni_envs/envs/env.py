@@ -10,7 +10,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from omni_envs.envs.batches import Observation
+from omni_envs.envs.batches import Observation, first_row
 from omni_envs.envs.options import UnexpectedOptionError
 from omni_envs.envs.vector_env import RENDER_MODES, OmniVectorEnv
 from omni_envs.errors import InvalidDataError
@@ -193,9 +193,9 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode; see ``OmniVectorEnv.reset`` for the options."""
         super().reset(seed=seed)
-        observations, infos = self.vector.reset(seed=seed, options=options)
+        observations, _ = self.vector.reset(seed=seed, options=options)
         self._np_random = self.vector.np_random
-        return _first(observations), _single(infos)
+        return first_row(observations), self.vector.single_info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advances by a control step.
@@ -203,21 +203,23 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
         Raises:
             InvalidDataError: The action has another shape, or a NaN or infinite entry.
         """
-        action = np.asarray(action, float)
-        owner = type(self).__name__
+        action = np.ascontiguousarray(action, float)
         if action.shape != self.action_space.shape:
             expected = f"an array {self.action_space.shape}"
-            raise InvalidDataError(owner, "action", expected, f"{action.shape}")
+            raise InvalidDataError(type(self).__name__, "action", expected, f"{action.shape}")
         if not np.isfinite(action).all():
             bad = int(np.flatnonzero(~np.isfinite(action))[0])
-            raise InvalidDataError(owner, f"action[{bad}]", "finite", f"{action[bad]}")
-        observations, rewards, terminated, truncated, infos = self.vector.step(action[None])
+            raise InvalidDataError(
+                type(self).__name__, f"action[{bad}]", "finite", f"{action[bad]}"
+            )
+        vector = self.vector
+        judged, truncated = vector.advance(action[None])
         return (
-            _first(observations),
-            float(rewards[0]),
-            bool(terminated[0]),
+            first_row(vector.observations),
+            float(judged.reward[0]),
+            bool(judged.terminated[0]),
             bool(truncated[0]),
-            _single(infos),
+            vector.single_info(judged),
         )
 
     def render(self) -> np.ndarray | None:
@@ -227,13 +229,3 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     def close(self) -> None:
         """Frees the graphics context."""
         self.vector.close()
-
-
-def _first(observations: Observation) -> Observation:
-    if isinstance(observations, dict):
-        return {key: values[0] for key, values in observations.items()}
-    return observations[0]
-
-
-def _single(infos: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: values[0].item() for key, values in infos.items() if not key.startswith("_")}

@@ -112,6 +112,8 @@ class Episodes:
         self.elapsed, self.possible = np.zeros(num, int), np.ones(num, int)
         self.action, self.default = np.zeros((num, joints)), np.tile(default, (num, 1))
         self.next_push, self.rows = np.zeros(num, int), np.zeros(num, int)
+        # First row and last frame of the motions, per simulation.
+        self._first, self._last = np.zeros(num, int), np.zeros(num, int)
 
     def start(
         self, ids: np.ndarray, motion: np.ndarray, frame: np.ndarray, rng: np.random.Generator
@@ -125,9 +127,13 @@ class Episodes:
             rng: Source of chance.
         """
         self.motion[ids], self.frame[ids], self.elapsed[ids] = motion, frame + 1, 0
-        left = self._library.lengths[motion] - 1 - frame
+        self._first[ids], self._last[ids] = (
+            self._library.starts[motion],
+            self._library.lengths[motion] - 1,
+        )
+        left = self._last[ids] - frame
         self.possible[ids] = left if self._max_steps is None else np.minimum(left, self._max_steps)
-        self.rows[ids] = self._library.starts[motion] + frame + 1
+        self.rows[ids] = self._first[ids] + frame + 1
         self.action[ids] = 0.0
         half = self._config.randomization.joint_default
         spread = (2.0 * rng.random((len(ids), len(self._nominal))) - 1.0) * half
@@ -142,8 +148,9 @@ class Episodes:
         """
         self.action = action
         self.elapsed += 1
-        self.frame = np.minimum(self.frame + 1, self._library.lengths[self.motion] - 1)
-        self.rows = self._library.starts[self.motion] + self.frame
+        self.frame += 1
+        np.minimum(self.frame, self._last, out=self.frame)
+        np.add(self._first, self.frame, out=self.rows)
         return self.elapsed >= self.possible
 
     def due_pushes(self, rng: np.random.Generator) -> np.ndarray:
@@ -151,7 +158,7 @@ class Episodes:
         if self._config.randomization.push is None:
             return np.empty(0, int)
         self.next_push -= 1
-        due = np.flatnonzero(self.next_push <= 0)
+        due = (self.next_push <= 0).nonzero()[0]
         if len(due):
             self.next_push[due] = self._interval(len(due), rng)
         return due

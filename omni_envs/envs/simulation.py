@@ -16,11 +16,13 @@ from omni_envs.tracking.alignment import Bodies
 SPEED_LIMIT = 1e3
 """A generalized velocity beyond this (m/s, rad/s) is a numerical explosion, not a motion."""
 
-_BAD_STATE = [
-    int(mujoco.mjtWarning.mjWARN_BADQPOS),
-    int(mujoco.mjtWarning.mjWARN_BADQVEL),
-    int(mujoco.mjtWarning.mjWARN_BADQACC),
-]
+_BAD_STATE = np.array(
+    [
+        int(mujoco.mjtWarning.mjWARN_BADQPOS),
+        int(mujoco.mjtWarning.mjWARN_BADQVEL),
+        int(mujoco.mjtWarning.mjWARN_BADQACC),
+    ]
+)
 _NOTHING = int(mujoco.mjtStage.mjSTAGE_NONE)
 
 
@@ -31,6 +33,7 @@ class Simulation:
         batch: MuJoCo's simulations.
         model: The model without randomization.
         num: N.
+        substeps: Physics steps per control step.
         variant: (N,) indices of the randomized models in use.
         qpos: (N, nq) live: robot 7 + n, then the object's 7.
         qvel: (N, nv) live; angular parts of free joints in the body frame.
@@ -56,7 +59,7 @@ class Simulation:
         threads: int = 0,
     ) -> None:
         model = env_model.model
-        self.model, self.num, self._substeps = model, num, substeps
+        self.model, self.num, self.substeps = model, num, substeps
         self._env_model = env_model
         self.batch = Batch(model, num, threads)
         self.qpos, self.qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
@@ -78,12 +81,12 @@ class Simulation:
         Returns:
             (N,) whether the simulation diverged. It is then back in the state before this step.
         """
-        for kept, now in zip(self._before, (self.qpos, self.qvel, self._warmstart), strict=True):
-            np.copyto(kept, now)
-        self.batch.step(nstep=self._substeps)
+        qpos, qvel, warmstart = self._before
+        qpos[:], qvel[:], warmstart[:] = self.qpos, self.qvel, self._warmstart
+        self.batch.step(nstep=self.substeps)
         # MuJoCo resets a simulation that blew up without a word, and only counts a warning.
-        warnings, diverged = self.batch.warning[:, _BAD_STATE, 1], np.empty(self.num, bool)
-        if kernels.exploded(self.qpos, self.qvel, warnings, SPEED_LIMIT, diverged):
+        diverged, warnings = np.empty(self.num, bool), self.batch.warning
+        if kernels.exploded(self.qpos, self.qvel, warnings, _BAD_STATE, SPEED_LIMIT, diverged):
             self.qpos[diverged], self.qvel[diverged] = (a[diverged] for a in self._before[:2])
             self._warmstart[diverged] = 0.0
             self._diverged |= diverged
@@ -129,6 +132,20 @@ class Simulation:
     def model_of(self, sim: int) -> mujoco.MjModel:
         """Returns a copy of the model of one simulation, randomization included."""
         return self.batch.get_model(sim)
+
+    def alone(self, variant: int) -> Batch:
+        """Returns one further simulation, of a randomized model."""
+        if self._variants.models:
+            return Batch(self._variants.models[variant], 1, 1)
+        batch = Batch(self.model, 1, 1)
+        for name, values in self._variants.fields.items():
+            batch.expand(name)[0] = values[variant]
+        return batch
+
+    @staticmethod
+    def bad_states(batch: Batch) -> np.ndarray:
+        """Returns (N,) how many warnings MuJoCo has counted of states that are not finite."""
+        return batch.warning[:, _BAD_STATE, 1].sum(axis=1)
 
     def copy_models_to(self, other: Batch) -> None:
         """Gives another batch of N simulations the randomized models of these."""

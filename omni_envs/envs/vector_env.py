@@ -19,7 +19,7 @@ from omni_envs.envs.batches import (
     empty_observations,
     observation_space,
 )
-from omni_envs.envs.compiled import CompiledTask
+from omni_envs.envs.compiled import CompiledTask, Judged
 from omni_envs.envs.divergence import Divergence, DivergenceLog
 from omni_envs.envs.episodes import Episodes, NoiseLevel, ObjectGate
 from omni_envs.envs.model import build_model
@@ -79,6 +79,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         action_targets: (T, n) per reference, the joint positions (rad) that actions count from, or
             None where that is the default pose.
         divergences: The latest diverged simulations, for replay.
+        observations: Those of all simulations, overwritten in every step.
 
     Args:
         num_envs: N.
@@ -201,7 +202,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.policy_layout, self.critic_layout = plain.policy_layout, plain.critic_layout
         critic = self.critic_layout.size if config.observation.privileged else None
         self.single_observation_space = observation_space(self.policy_layout.size, critic)
-        self._observations = empty_observations(num_envs, self.policy_layout.size, critic)
+        self.observations = empty_observations(num_envs, self.policy_layout.size, critic)
         limit, joints = config.action.limit, self.robot.num_joints
         self.single_action_space = spaces.Box(-limit, limit, (joints,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -258,7 +259,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             ids = np.flatnonzero(mask)
         self._start(ids, **options)
         self._started = True
-        return copied(self._observations), self._place()
+        return copied(self.observations), batched_infos(self._place())
 
     def step(
         self, actions: np.ndarray
@@ -275,14 +276,34 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         Raises:
             InvalidDataError: The actions have another shape.
         """
-        if not self._started:
-            raise InvalidOptionError("step: call reset first.")
-        episodes, simulation, rows = self._episodes, self.simulation, self._episodes.rows
         actions = np.ascontiguousarray(actions, float)
         if actions.shape != self.action_space.shape:
             raise InvalidDataError(
                 type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"
             )
+        judged, truncated = self.advance(actions)
+        infos = batched_infos(self._infos(judged) | self._place())
+        done = judged.terminated | truncated
+        finished = done.nonzero()[0]
+        if len(finished) and self.autoreset_mode is AutoresetMode.SAME_STEP:
+            infos = add_finals(infos, self.observations, done)
+            self._start(finished)
+            infos |= self._place()
+        return copied(self.observations), judged.reward, judged.terminated, truncated, infos
+
+    def advance(self, actions: np.ndarray) -> tuple[Judged, np.ndarray]:
+        """Advances all simulations by a control step, and starts none anew.
+
+        Args:
+            actions: (N, n) float64, contiguous.
+
+        Returns:
+            What the step was worth, and (N,) which episodes are over without being terminated.
+            What comes next is in ``observations``.
+        """
+        if not self._started:
+            raise InvalidOptionError("step: call reset first.")
+        episodes, simulation = self._episodes, self.simulation
         # From here on an action is the standard one of the same joint target: rewards and the
         # observed previous action then mean the same in all modes, and for an exported policy.
         action, bad = np.empty_like(actions), np.empty(self.num_envs, bool)
@@ -290,7 +311,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             actions,
             self.config.action.limit,
             self._lead,
-            rows,
+            episodes.rows,
             episodes.default,
             self._scale,
             action,
@@ -299,42 +320,31 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         )
         diverged = simulation.step()
         diverged |= bad
-        bodies = simulation.bodies()
         judged = self._task.judge(
-            rows,
+            episodes.rows,
             simulation.qpos,
-            bodies,
+            simulation.bodies(),
             action,
             episodes.action,
             simulation.history,
             self._gate.open,
+            diverged,
         )
-        terminated = diverged.copy()
-        for lost in judged.tests.values():
-            terminated |= lost
-        infos = self._infos(judged, diverged)
-        reward = judged.reward
         if diverged.any():
-            reward[diverged] = 0.0
-            self._record_divergence(np.flatnonzero(diverged))
-        ended_frame = episodes.frame
-        truncated = episodes.advance(action) & ~terminated
-        done = terminated | truncated
-        finished = np.flatnonzero(done)
+            self._record_divergence(diverged.nonzero()[0])
+        failed = judged.terminated.nonzero()[0]
+        self.sampler.record(episodes.motion[failed], episodes.frame[failed])
+        truncated = episodes.advance(action)
+        done = truncated | judged.terminated
+        truncated &= ~judged.terminated
+        finished = done.nonzero()[0]
         if len(finished):
             lasted = episodes.elapsed[finished], episodes.possible[finished]
             self._gate.record(*lasted)
             self._noise.record(*lasted)
-        failed = np.flatnonzero(terminated)
-        self.sampler.record(episodes.motion[failed], ended_frame[failed])
         self._push(done)
         self._observe(self._everyone)
-        infos |= self._place()
-        if len(finished) and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            infos = add_finals(infos, self._observations, done)
-            self._start(finished)
-            infos |= self._place()
-        return copied(self._observations), reward, terminated, truncated, infos
+        return judged, truncated
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Returns one (height, width, 3) uint8 picture per simulation, the reference as a ghost."""
@@ -378,9 +388,9 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
 
     def _push(self, done: np.ndarray) -> None:
         due = self._episodes.due_pushes(self.np_random)
-        due = due[~done[due]]
         config = self.config.randomization.push
         if len(due) and config is not None:
+            due = due[~done[due]]
             self.simulation.qvel[due, :6] += push(
                 self.simulation.qpos[due, 3:7], config, self.np_random
             )
@@ -396,20 +406,29 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             episodes.action,
             self.np_random,
             ids,
-            self._observations,
+            self.observations,
         )
 
-    def _infos(self, judged: Any, diverged: np.ndarray) -> dict[str, Any]:
-        values = {f"reward/{k}": v for k, v in judged.terms.items()}
-        if diverged.any():
-            values = {k: np.where(diverged, 0.0, v) for k, v in values.items()}
-        values |= {f"error/{k}": v for k, v in judged.errors.items()}
-        values |= {f"terminated/{k}": v for k, v in judged.tests.items()}
-        return batched_infos(values | {"diverged": diverged})
+    def _infos(self, judged: Judged) -> dict[str, np.ndarray]:
+        values = dict(zip(self._task.figures, judged.figures, strict=True))
+        rows = self._task.flag_rows
+        return values | {
+            name: judged.flags[k] for name, k in zip(self._task.flags, rows, strict=True)
+        }
 
-    def _place(self) -> dict[str, Any]:
-        episodes = self._episodes
-        return batched_infos({"motion": episodes.motion.copy(), "frame": episodes.frame.copy()})
+    def _place(self) -> dict[str, np.ndarray]:
+        return {"motion": self._episodes.motion.copy(), "frame": self._episodes.frame.copy()}
+
+    def single_info(self, judged: Judged | None = None) -> dict[str, Any]:
+        """Returns the infos of the first simulation as plain numbers, of a step or of a start."""
+        info: dict[str, Any] = {}
+        if judged is not None:
+            info = dict(zip(self._task.figures, judged.figures[:, 0].tolist(), strict=True))
+            flags = judged.flags[:, 0].tolist()
+            for name, k in zip(self._task.flags, self._task.flag_rows, strict=True):
+                info[name] = flags[k]
+        info["motion"], info["frame"] = int(self._episodes.motion[0]), int(self._episodes.frame[0])
+        return info
 
     def _record_divergence(self, ids: np.ndarray) -> None:
         for i in ids:

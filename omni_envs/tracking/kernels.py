@@ -204,13 +204,18 @@ def joint_targets(
 
 
 @_compiled
-def exploded(qpos: Array, qvel: Array, warnings: Array, limit: float, out: Array) -> bool:
-    """Whether any simulation has a warning, a speed over the limit, or a NaN; (N,) which."""
+def exploded(
+    qpos: Array, qvel: Array, warnings: Array, kinds: Array, limit: float, out: Array
+) -> bool:
+    """Whether any simulation has a warning, a speed over the limit, or a NaN; (N,) which.
+
+    ``warnings`` is (N, kinds, 2), with counts last.
+    """
     some = False
     for i in range(len(qpos)):
         bad = False
-        for w in range(warnings.shape[1]):
-            if warnings[i, w] != 0:
+        for w in kinds:
+            if warnings[i, w, 1] != 0:
                 bad = True
         for v in range(qvel.shape[1]):
             if not abs(qvel[i, v]) < limit:
@@ -303,13 +308,14 @@ def _contacts(history: Array, numbers: Numbers) -> int:
 @_compiled
 def judge(
     numbers: Numbers, at: Columns, table: Array, rows: Array, qpos: Array, bodies: Bodies,
-    action: Array, previous: Array, history: Array, object_active: bool,
-    out_terms: Array, out_errors: Array, out_tests: Array, out_reward: Array,
+    action: Array, previous: Array, history: Array, object_active: bool, diverged: Array,
+    out_figures: Array, out_flags: Array, out_reward: Array, out_terminated: Array,
 ) -> None:  # fmt: skip
     """Rewards and terminations: see ``rewards``, ``terminations`` and ``alignment``.
 
-    Writes (terms, N) weighted rewards, (errors, N) roots of the squared errors, (4, N) tests and
-    (N,) sums of the rewards.
+    Writes (terms + errors, N) weighted rewards and roots of the squared errors, (5, N) the four
+    tests and whether the simulation diverged, in which case there is no reward, (N,) sums of the
+    rewards and (N,) whether any flag is set.
     """
     count, a = bodies.position.shape[1], numbers.anchor
     limits, tracking = numbers.thresholds, len(numbers.columns)
@@ -351,31 +357,36 @@ def judge(
             pose = qpos[i, numbers.root_nq :]
             e[6] = _squared(pose, _triple(r, at.object_pose))
             e[7] = _squared_angle(_dot(pose[3:], _quadruple(r, at.object_pose + 3)))
-        out_tests[0, i] = abs(p[2] - rp[2]) > limits[0]
-        out_tests[1, i] = abs(_gravity_z(q) - _gravity_z(rq)) > limits[1]
-        out_tests[2, i] = False
+        out_flags[0, i] = abs(p[2] - rp[2]) > limits[0]
+        out_flags[1, i] = abs(_gravity_z(q) - _gravity_z(rq)) > limits[1]
+        out_flags[2, i] = False
         for b in numbers.end_effectors:
-            out_tests[2, i] |= (
+            out_flags[2, i] |= (
                 abs(bodies.position[i, b, 2] - r[at.position + 3 * b + 2]) > limits[2]
             )
         lost = e[6] > limits[3] * limits[3] or e[7] > limits[4] * limits[4]
-        out_tests[3, i] = lost and object_active
-        for k in range(len(out_errors)):
-            out_errors[k, i] = sqrt(e[k])
+        out_flags[3, i] = lost and object_active
+        out_flags[4, i] = diverged[i]
+        terminated = diverged[i]
+        for k in range(4):
+            terminated |= out_flags[k, i]
+        out_terminated[i] = terminated
+        for k in range(tracking + 3, len(out_figures)):
+            out_figures[k, i] = sqrt(e[k - tracking - 3])
         change, excess = 0.0, 0.0
         for j in range(n):
             change += (action[i, j] - previous[i, j]) ** 2
             joint = qpos[i, 7 + j]
             excess += max(joint - numbers.upper[j], numbers.lower[j] - joint, 0.0)
         reward = 0.0
-        for k in range(tracking):
-            term = exp(e[numbers.columns[k]] * numbers.inverse_variance[k]) * numbers.weights[k]
-            out_terms[k, i] = term
-            reward += term
         penalties = (change, excess, float(_contacts(history[i], numbers)))
-        for k in range(3):
-            term = penalties[k] * numbers.weights[tracking + k]
-            out_terms[tracking + k, i] = term
+        for k in range(tracking + 3):
+            if k < tracking:
+                value = exp(e[numbers.columns[k]] * numbers.inverse_variance[k])
+            else:
+                value = penalties[k - tracking]
+            term = 0.0 if diverged[i] else value * numbers.weights[k]
+            out_figures[k, i] = term
             reward += term
         out_reward[i] = reward
 

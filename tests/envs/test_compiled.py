@@ -68,19 +68,38 @@ def test_judgements_agree(case, object_active):
     history = sensor_history(model, len(s.rows), rng)
     forces = model.contact_forces(history)
     expected = plain.judge(s.qpos, s.bodies, s.frames, s.action, s.previous, forces, object_active)
-    found = compiled.judge(s.rows, s.qpos, s.bodies, s.action, s.previous, history, object_active)
+    diverged = np.zeros(len(s.rows), bool)
+    found = compiled.judge(
+        s.rows, s.qpos, s.bodies, s.action, s.previous, history, object_active, diverged
+    )
     np.testing.assert_allclose(found.reward, expected.reward, atol=1e-12)
-    assert list(found.terms) == list(expected.terms)
-    assert list(found.errors) == list(expected.errors)
-    assert list(found.tests) == list(expected.tests)
-    for ours, theirs in ((found.terms, expected.terms), (found.errors, expected.errors)):
-        for name, values in theirs.items():
-            np.testing.assert_allclose(ours[name], values, atol=1e-12, err_msg=name)
-    lost = []
-    for name, values in expected.tests.items():
-        np.testing.assert_array_equal(found.tests[name], values, err_msg=name)
-        lost += [values.any(), not values.all()]
-    assert any(lost) and len(np.unique(found.terms["contact"])) > 1
+    figures = {f"reward/{k}": v for k, v in expected.terms.items()}
+    figures |= {f"error/{k}": v for k, v in expected.errors.items()}
+    assert list(compiled.figures) == list(figures)
+    for values, (name, theirs) in zip(found.figures, figures.items(), strict=True):
+        np.testing.assert_allclose(values, theirs, atol=1e-12, err_msg=name)
+    assert list(compiled.flags) == [*(f"terminated/{k}" for k in expected.tests), "diverged"]
+    rows = found.flags[compiled.flag_rows]
+    np.testing.assert_array_equal(rows[:-1], list(expected.tests.values()))
+    np.testing.assert_array_equal(found.terminated, np.any(list(expected.tests.values()), axis=0))
+    assert not rows[-1].any()
+    # Not everything passes, not everything fails, and there are contacts to count.
+    lost = [found.terminated.any(), not found.terminated.all()]
+    contacts = found.figures[compiled.figures.index("reward/contact")]
+    assert all(lost) and len(np.unique(contacts)) > 1
+
+
+def test_diverged_simulations_earn_nothing_and_are_terminated(case):
+    _, compiled, s, model, rng = case
+    history = sensor_history(model, len(s.rows), rng)
+    diverged = np.arange(len(s.rows)) % 2 == 1
+    states = (s.rows, s.qpos, s.bodies, s.action, s.previous, history, False)
+    found, well = (compiled.judge(*states, d) for d in (diverged, np.zeros_like(diverged)))
+    terms = [k for k, name in enumerate(compiled.figures) if name.startswith("reward/")]
+    assert found.terminated[diverged].all() and not found.reward[diverged].any()
+    assert not found.figures[terms][:, diverged].any()
+    np.testing.assert_array_equal(found.reward[~diverged], well.reward[~diverged])
+    np.testing.assert_array_equal(found.flags[4], diverged)
 
 
 def test_observations_agree(case):

@@ -20,11 +20,13 @@ def test_joint_targets():
 
 
 def test_explosions_are_warnings_speeds_and_nan():
-    qpos, qvel, warnings = np.zeros((5, 7)), np.zeros((5, 6)), np.zeros((5, 3), np.int32)
+    qpos, qvel, warnings = np.zeros((5, 7)), np.zeros((5, 6)), np.zeros((5, 7, 2), np.int32)
+    warnings[:, 3, 1], warnings[:, 5, 0] = 1, 1
+    kinds = np.array([4, 5])
     out = np.empty(5, bool)
-    assert not kernels.exploded(qpos, qvel, warnings, 100.0, out)
-    qpos[1, 2], qvel[2, 0], qvel[3, 5], warnings[4, 1] = np.inf, np.nan, -100.0, 1
-    assert kernels.exploded(qpos, qvel, warnings, 100.0, out)
+    assert not kernels.exploded(qpos, qvel, warnings, kinds, 100.0, out)
+    qpos[1, 2], qvel[2, 0], qvel[3, 5], warnings[4, 5, 1] = np.inf, np.nan, -100.0, 1
+    assert kernels.exploded(qpos, qvel, warnings, kinds, 100.0, out)
     assert out.tolist() == [False, True, True, True, True]
 
 
