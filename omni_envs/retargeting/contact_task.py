@@ -12,7 +12,7 @@ from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 _NEAR = 0.01  # m
-_RAMP = 5  # frames
+_RAMP = 0.1  # s over which the pull grows before a contact, and fades after it
 
 
 class ContactTask(CostTask):
@@ -33,12 +33,15 @@ class ContactTask(CostTask):
             link for link in source.contact_points if link in configuration.robot.contact_links
         ]
         places = [np.asarray(source.contact_points[link], float) for link in links]
+        touching = np.array([np.isfinite(place).all(axis=1) for place in places])
+        touching = touching.reshape(len(links), source.num_frames)
+        self._ramps, nearest = _ramps(touching, round(_RAMP * source.fps))
+        places = [place[near] for place, near in zip(places, nearest, strict=True)]
         if source.object_poses is not None:
             poses = source.object_poses
             places = [poses[:, :3] + rotations.rotate(poses[:, 3:], place) for place in places]
         self._places = np.array(places).reshape(len(links), source.num_frames, 3)
         self._links = [_Link(configuration, link) for link in links]
-        self._ramps = _ramps(np.isfinite(self._places).all(axis=2))
         self.set_frame(None)
 
     def set_frame(self, t: int | None) -> None:
@@ -61,16 +64,29 @@ class ContactTask(CostTask):
         return Quadratic(*kernels.weighted_squares(J, -gaps.ravel(), self._weight * self._ramp))
 
 
-def _ramps(touching: np.ndarray) -> np.ndarray:
-    """(links, T) weight in [0, 1] that rises and falls within each contact: no pull is sudden."""
-    ramps = np.zeros(touching.shape)
-    for ramp, flags in zip(ramps, touching, strict=True):
-        edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
-        for start, end in edges.reshape(-1, 2).tolist():
-            since = np.arange(1, end - start + 1) + (_RAMP if start == 0 else 0)
-            left = np.arange(end - start, 0, -1) + (_RAMP if end == len(flags) else 0)
-            ramp[start:end] = np.minimum(np.minimum(since, left) / _RAMP, 1.0)
-    return ramps
+def _ramps(touching: np.ndarray, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights in [0, 1], and the frame whose place pulls: no pull is sudden.
+
+    Args:
+        touching: (links, T) bool.
+        frames: Frames over which the pull on a link grows before a contact, and fades after it.
+
+    Returns:
+        (links, T) 1 in contact, falling to 0 around it; and (links, T) the nearest frame in
+        contact, any frame where there is none near.
+    """
+    count = touching.shape[1]
+    t = np.arange(count)
+    ramps, nearest = np.zeros(touching.shape), np.tile(t, (len(touching), 1))
+    for ramp, near, flags in zip(ramps, nearest, touching, strict=True):
+        known = np.flatnonzero(flags)
+        if len(known):
+            after = np.searchsorted(known, t)
+            before = known[np.maximum(after - 1, 0)]
+            after = known[np.minimum(after, len(known) - 1)]
+            near[:] = np.where(np.abs(t - before) <= np.abs(t - after), before, after)
+            ramp[:] = np.maximum(1.0 - np.abs(t - near) / (frames + 1), 0.0)
+    return ramps, nearest
 
 
 class _Link:

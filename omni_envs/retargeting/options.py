@@ -85,7 +85,7 @@ class RetargetOptions:
     surface_points: int = 100
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
-    contact_weight: float = 100.0
+    contact_weight: float = 200.0
     nominal_weight: float = 5.0
     nominal_decay: float | None = 1.0 / 3.0
     trust_region: float = 0.2

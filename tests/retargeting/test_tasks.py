@@ -102,10 +102,15 @@ def test_tasks_that_are_off(grasp, configuration, q):
 def test_contact_pull_starts_gently(grasp, configuration):
     from omni_envs.retargeting.contact_task import _ramps
 
-    ramps = _ramps(np.array([[False] * 3 + [True] * 20 + [False] * 2, [True] * 25]))
-    assert ramps[0, 3] == pytest.approx(0.2) and ramps[0, 22] == pytest.approx(0.2)
-    assert ramps[0, 12] == 1.0 and ramps[0, 2] == 0.0
-    assert (ramps[1] == 1.0).all()
+    flags = np.zeros((3, 25), bool)
+    flags[0, 10:15] = True
+    flags[1] = True
+    ramps, nearest = _ramps(flags, 4)
+    np.testing.assert_allclose(ramps[0, 5:12], [0, 0.2, 0.4, 0.6, 0.8, 1, 1])
+    np.testing.assert_allclose(ramps[0, 13:20], [1, 1, 0.8, 0.6, 0.4, 0.2, 0])
+    # Before a contact the place is the first one touched, after it the last.
+    assert nearest[0, 7] == 10 and nearest[0, 12] == 12 and nearest[0, 17] == 14
+    assert (ramps[1] == 1.0).all() and (ramps[2] == 0.0).all()
 
 
 def test_contact_gap_is_to_the_surface_of_the_link(grasp, configuration, q):
