@@ -14,8 +14,8 @@ from numpy.lib import format as npy_format
 
 from omni_envs.errors import FileFormatError
 
-MAX_BYTES = 2 << 30
-"""Largest array that is read from an archive."""
+MAX_BYTES = 512 << 20
+"""Largest array that is read from an archive: 100 000 frames of 200 joints are 480 MB."""
 
 _MAGIC = {b"PK\x03\x04": "a .npz archive", b"\x80": "a pickle", b"\x93NUMPY": "a .npy array"}
 _UNREADABLE = (
@@ -105,8 +105,8 @@ def _read_member(
             count *= int(size)
         size = count * dtype.itemsize
         if size > MAX_BYTES:
-            found = f"shape {shape}, {size / 2**30:.1f} GiB"
-            raise FileFormatError(path, field, f"at most {MAX_BYTES >> 30} GiB", found)
+            expected = f"at most {MAX_BYTES >> 20} MiB (a .npy may be longer: it is mapped)"
+            raise FileFormatError(path, field, expected, f"shape {shape}, {size >> 20} MiB")
         if size > member.file_size:
             raise FileFormatError(path, field, f"{size} bytes", f"{member.file_size}: truncated")
         data = file.read(size)

@@ -36,6 +36,7 @@ _AXES: tuple[UpAxis, ...] = ("x", "y", "z")
 
 _ABOVE = 0.1  # legs; shoulders of someone who crawls are, on average, still this high
 _UPRIGHT = 0.7  # legs; shoulders that are on average this high above the ankles stand
+_BACKWARDS = -0.3  # mean cosine between forward and the toes; −0.9 for a mirrored walk
 _CLEAR = 3.0  # times the next; by so much does one axis have to win
 
 
@@ -145,9 +146,11 @@ def check_sides(path: Path, keypoints: np.ndarray) -> None:
     spine = _middle(keypoints, "shoulder") - _middle(keypoints, "hip")
     forward = np.cross(across, spine)
     toes = _middle(keypoints, "toe") - _middle(keypoints, "ankle")
-    ahead = np.mean(np.sum(forward * toes, axis=-1) > 0)
-    if ahead < 0.5:
-        found = f"toes that point backwards on {100 * (1 - ahead):.0f} % of the frames"
+    size = np.linalg.norm(forward, axis=-1) * np.linalg.norm(toes, axis=-1)
+    cosine = np.sum(forward * toes, axis=-1) / np.maximum(size, 1e-12)
+    # Feet that are stretched, as those of someone on the knees, point neither way.
+    if np.mean(cosine) < _BACKWARDS:
+        found = f"toes that point backwards on {100 * np.mean(cosine < 0):.0f} % of the frames"
         expected = "left and right where hips, shoulders and toes agree"
         hint = "; the motion is mirrored, or the skeleton names the sides the wrong way round"
         raise FileFormatError(path, "left and right", expected, found + hint)

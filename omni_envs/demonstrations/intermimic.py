@@ -15,12 +15,13 @@ import numpy as np
 
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.skeleton import SMPLH
-from omni_envs.demonstrations.source_options import SourceOptions
+from omni_envs.demonstrations.source_options import MAX_FRAMES, SourceOptions
 from omni_envs.errors import FileFormatError, MissingDependencyError
 from omni_envs.scenes import Box, Part, Scene, SceneObject, load_convex_parts
 
 FPS = 30.0
 COLUMNS = 591
+_MAX_BYTES = MAX_FRAMES * COLUMNS * 8
 
 SUBJECT_HEIGHTS = {
     "sub1": 1.6637, "sub2": 1.8438, "sub3": 1.9411, "sub4": 1.7905, "sub5": 1.8171,
@@ -113,6 +114,9 @@ def _read(path: Path) -> np.ndarray:
     if not path.is_file():
         raise FileFormatError(path, "file", "an existing InterMimic .pt file", "nothing")
     expected = f"one tensor of shape (T, {COLUMNS}), T ≥ 1"
+    if path.stat().st_size > _MAX_BYTES:  # read whole, unlike arrays that can be mapped
+        found = f"{path.stat().st_size >> 20} MiB"
+        raise FileFormatError(path, "file", f"at most {_MAX_BYTES >> 20} MiB", found)
     try:
         with warnings.catch_warnings(action="ignore"):  # the error below says it all
             tensor = torch.load(path, map_location="cpu", weights_only=True)

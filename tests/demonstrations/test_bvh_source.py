@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
 from omni_envs.demonstrations import (
     SourceOptions,
@@ -245,3 +247,22 @@ def test_recorded_cmu_jumps_with_daz_names(shared):
     toes = source.keypoints[:, [KEYPOINTS.index(f"{s}_toe") for s in ("left", "right")], 2]
     assert toes.max() > 0.2
     assert np.median(toes[source.stance["default"]]) < 0.04
+
+
+def test_terrain_stands_where_the_file_has_it(person, write_bvh, tmp_path):
+    """With terrain the ground is z = 0 of the file, tilt and all."""
+    who = person(place=(0.3, 0.35, -0.2))
+    box = trimesh.creation.box(extents=[1, 1, 0.35]).apply_translation([0, 0, 0.175])
+    box.export(tmp_path / "step.obj")
+    demo = load_demonstration(write_bvh(who), terrain_mesh=tmp_path / "step.obj")
+    assert joint(demo, "RightToe")[0, 2] == pytest.approx(0.35, abs=1e-6)
+    (part,) = demo.scene.terrain.parts
+    np.testing.assert_allclose(part.shape.half_extents, (0.5, 0.5, 0.175), atol=1e-6)
+
+
+def test_stretched_feet_point_neither_way(person, write_bvh):
+    """Someone on the knees is not taken for mirrored."""
+    who = person()
+    for side in ("Left", "Right"):
+        who.local[f"{side}Foot"] = Rotation.from_rotvec(np.tile([1.3, 0.0, 0.0], (who.frames, 1)))
+    assert load_demonstration(write_bvh(who)).num_frames == 61

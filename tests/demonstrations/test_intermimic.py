@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from omni_envs.demonstrations import SMPLH, SourceOptions, closest_points, load_intermimic
+from omni_envs.demonstrations import (
+    SMPLH,
+    SourceOptions,
+    closest_points,
+    intermimic,
+    load_intermimic,
+)
 from omni_envs.demonstrations.intermimic import LARGEBOX
 from omni_envs.errors import FileFormatError
 from omni_envs.scenes import Box
@@ -66,6 +72,21 @@ def test_truncated_file(tmp_path, intermimic_array, keep):
     with pytest.raises(FileFormatError, match=r"sub3_largebox_003\.pt: content") as error:
         load_intermimic(path)
     assert "\n" not in str(error.value)
+
+
+def test_files_that_are_too_large_are_not_read(tmp_path, intermimic_array, monkeypatch):
+    monkeypatch.setattr(intermimic, "_MAX_BYTES", 1000)
+    with pytest.raises(FileFormatError, match="file: expected at most"):
+        load_intermimic(write(tmp_path, intermimic_array))
+
+
+def test_a_part(tmp_path, intermimic_array):
+    path = write(tmp_path, intermimic_array)
+    part = load_intermimic(path, SourceOptions(start=0.05, end=0.15))
+    assert part.num_frames == 3 and len(part.object_poses) == 3
+    np.testing.assert_array_equal(part.positions, load_intermimic(path).positions[2:5])
+    with pytest.raises(FileFormatError, match="start, end"):
+        load_intermimic(path, SourceOptions(start=9.0))
 
 
 def test_missing_file(tmp_path):
