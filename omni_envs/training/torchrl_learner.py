@@ -39,7 +39,8 @@ class TorchRLLearner:
 
     def __init__(self, config: TrainConfig, env: VectorEnv) -> None:
         torch.manual_seed(config.seed)
-        self._config, self._env = config, make_torchrl_env(env, infos=(BODY_ERROR,))
+        self._config, self._vector = config, env
+        self._env = make_torchrl_env(env, infos=(BODY_ERROR,))
         keys = list(self._env.observation_spec.keys())
         seen, privileged = observation_keys(keys)
         space: Any = env.single_action_space
@@ -87,6 +88,7 @@ class TorchRLLearner:
             "episode_length": float(mean[1]),
             "episode_return": float(mean[0]),
             "body_error_m": error,
+            "noise_level": float(getattr(self._vector.unwrapped, "noise_level", 1.0)),
             **figures,
         }
 

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from omni_envs.errors import MissingDependencyError, OmniEnvsError
 
@@ -59,7 +61,7 @@ class TensorDictPPO:
         self.config = config = config or PPOConfig()
         self.network, self.actor, self.critic = network, actor, critic
         self.learning_rate, self.updates = config.learning_rate, 0
-        self.optimizer = torch.optim.Adam(network.parameters(), lr=config.learning_rate, fused=True)
+        self.optimizer = self._make_optimizer()
         self.advantages = GAE(
             gamma=config.gamma,
             lmbda=config.gae_lambda,
@@ -67,17 +69,21 @@ class TensorDictPPO:
             average_gae=True,
             deactivate_vmap=True,
         )
-        self.loss = ClipPPOLoss(
+        self.policy_loss = ClipPPOLoss(
             actor,
-            critic,
             clip_epsilon=config.clip,
             entropy_coeff=config.entropy_weight,
+            functional=False,
+        )
+        self.value_loss = ClipPPOLoss(
+            actor,
+            critic,
             critic_coeff=1.0,
             loss_critic_type="l2",
             clip_value=config.value_clip or None,
             log_explained_variance=False,
             functional=False,
-        )
+        ).loss_critic
 
     def learn(self, rollout: TensorDictBase) -> dict[str, float]:
         """Updates the network from a rollout, the very first one only its normalisers.
@@ -113,24 +119,28 @@ class TensorDictPPO:
                 ``state_value``, ``value_target`` and ``advantage``.
         """
         config, totals, last = self.config, Counter[str](), 0.0
-        for epoch in range(config.epochs):
-            for index in torch.randperm(len(samples)).tensor_split(config.minibatches):
-                batch = samples[index]
-                self.optimizer.zero_grad()
-                figures = self.backward(batch)
-                if not all(map(math.isfinite, figures.values())):
-                    raise OmniEnvsError(
-                        f"Training diverged after {self.updates} passes: {figures}. "
-                        "Resume from a checkpoint with a smaller learning rate."
-                    )
-                if config.adapt_every == "minibatch":
-                    self.adapt_learning_rate(figures["kl"])
-                nn.utils.clip_grad_norm_(self.network.parameters(), config.max_grad_norm)
-                self.optimizer.step()
-                totals.update(figures)
-                if epoch == config.epochs - 1:
-                    last += figures["kl"] / config.minibatches
-            self.updates += 1
+        # Actor and critic share no weights: each learns in its own thread, so that two cores are
+        # busy without waiting for each other inside every small matrix product.
+        with ThreadPoolExecutor(1) as second:
+            for epoch in range(config.epochs):
+                for index in torch.randperm(len(samples)).tensor_split(config.minibatches):
+                    batch = samples[index]
+                    self.optimizer.zero_grad()
+                    value = second.submit(self.critic_backward, batch)
+                    figures = self.actor_backward(batch) | value.result()
+                    if not all(map(math.isfinite, figures.values())):
+                        raise OmniEnvsError(
+                            f"Training diverged after {self.updates} passes: {figures}. "
+                            "Resume from a checkpoint with a smaller learning rate."
+                        )
+                    if config.adapt_every == "minibatch":
+                        self.adapt_learning_rate(figures["kl"])
+                    nn.utils.clip_grad_norm_(self.network.parameters(), config.max_grad_norm)
+                    self.optimizer.step()
+                    totals.update(figures)
+                    if epoch == config.epochs - 1:
+                        last += figures["kl"] / config.minibatches
+                self.updates += 1
         if config.adapt_every == "update":
             self.adapt_learning_rate(last)
         steps = config.epochs * config.minibatches
@@ -140,25 +150,40 @@ class TensorDictPPO:
             "action_std": self.network.log_std.exp().mean().item(),
         }
 
-    def backward(self, batch: TensorDictBase) -> dict[str, float]:
-        """Adds the gradient of the loss over a mini-batch; returns the figures to log."""
-        losses = self.loss(batch)
-        value = self.config.value_weight * losses["loss_critic"]
-        (losses["loss_objective"] + losses["loss_entropy"] + value).backward()
+    def actor_backward(self, batch: TensorDictBase) -> dict[str, float]:
+        """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
+        losses = self.policy_loss(batch)
+        (losses["loss_objective"] + losses["loss_entropy"]).backward()
         with torch.no_grad():
-            acted = IndependentNormal(batch["loc"], batch["scale"])
-            kl = kl_divergence(acted.base_dist, self.actor.get_dist(batch).base_dist)
+            acted = IndependentNormal(batch["loc"], batch["scale"]).base_dist
+            kl = kl_divergence(acted, self.actor.get_dist(batch.clone(False)).base_dist)
         return {
             "kl": kl.sum(dim=-1).mean().item(),
             "surrogate_loss": losses["loss_objective"].item(),
-            "value_loss": losses["loss_critic"].item(),
             "entropy": losses["entropy"].item(),
             "clip_fraction": losses["clip_fraction"].item(),
         }
+
+    def critic_backward(self, batch: TensorDictBase) -> dict[str, float]:
+        """Adds the gradient of the value loss; returns the figures to log."""
+        losses, *_ = self.value_loss(batch.clone(False))
+        loss = losses.mean()
+        (self.config.value_weight * loss).backward()
+        return {"value_loss": loss.item()}
 
     def adapt_learning_rate(self, kl: float) -> None:
         """Has the learning rate of the next gradient step follow the divergence."""
         rate = adapted_learning_rate(self.learning_rate, kl, self.config.desired_kl)
         self.learning_rate = rate
-        for group in self.optimizer.param_groups:
-            group["lr"] = rate
+        # A second group is the critic's, whose rate is constant.
+        self.optimizer.param_groups[0]["lr"] = rate
+
+    def _make_optimizer(self) -> torch.optim.Adam:
+        config, parameters = self.config, list(self.network.parameters())
+        groups: list[dict[str, Any]] = [{"params": parameters, "lr": config.learning_rate}]
+        if config.critic_learning_rate:
+            critic = list(self.critic.parameters())
+            members = {id(p) for p in critic}
+            groups[0]["params"] = [p for p in parameters if id(p) not in members]
+            groups.append({"params": critic, "lr": config.critic_learning_rate})
+        return torch.optim.Adam(groups, fused=True)

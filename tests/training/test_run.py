@@ -22,6 +22,12 @@ ROLLOUT = 8 * 16
 MODES = {"sb3": AutoresetMode.SAME_STEP, "torchrl": AutoresetMode.DISABLED}
 PACKAGES = {"sb3": "stable_baselines3", "torchrl": "torchrl"}
 
+COLUMNS = {
+    "steps", "seconds", "steps_per_s", "episode_length", "episode_return", "body_error_m",
+    "noise_level", "kl", "surrogate_loss", "value_loss", "entropy", "clip_fraction",
+    "learning_rate", "action_std",
+}  # fmt: skip
+
 
 @pytest.fixture(params=MODES)
 def trainer(request) -> str:
@@ -63,6 +69,7 @@ def test_a_run_directory_holds_what_it_should(config, env, tmp_path):
     with (tmp_path / "curve.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert [float(r["steps"]) for r in rows] == [r["steps"] for r in result.history]
+    assert set(result.history[-1]) == COLUMNS
     assert 0 < result.history[-1]["episode_length"] <= 20
     assert result.history[-1]["kl"] > 0
     assert 0 < result.history[-1]["body_error_m"] < 1.5
