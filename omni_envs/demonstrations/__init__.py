@@ -24,6 +24,7 @@ from omni_envs.demonstrations.stance import (
     stance_schedule,
 )
 from omni_envs.demonstrations.surface import closest_points
+from omni_envs.demonstrations.variation import Variation, sample_variations, variation_grid, vary
 
 __all__ = [
     "MOCAP",
@@ -38,6 +39,7 @@ __all__ = [
     "StanceMode",
     "Unit",
     "UpAxis",
+    "Variation",
     "builtin_demonstration",
     "builtin_names",
     "closest_points",
@@ -52,9 +54,12 @@ __all__ = [
     "load_smpl",
     "object_contacts",
     "read_skeleton_map",
+    "sample_variations",
     "scale_demonstration",
     "skeleton_names",
     "stance_intervals",
     "stance_schedule",
     "terrain_contacts",
+    "variation_grid",
+    "vary",
 ]

@@ -40,6 +40,10 @@ class SourceMotion:
         contact_points: Link to (T, 3) point of the surface that the human touches, in the frame of
             the true-size object (object contact) or in the world (terrain contact), NaN without
             contact.
+        original_scene: The target scene before a variation gave object or terrain another shape,
+            or None. Faces of its surfaces correspond one to one.
+        mesh_object_poses: (T, 7) pose of the object that the interaction mesh sees in the target
+            scene, where a variation makes it another than ``object_poses``; or None.
     """
 
     name: str
@@ -52,6 +56,8 @@ class SourceMotion:
     stance: Mapping[str, np.ndarray]
     contacts: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_points: Mapping[str, np.ndarray] = field(default_factory=dict)
+    original_scene: Scene | None = None
+    mesh_object_poses: np.ndarray | None = None
 
     @property
     def num_frames(self) -> int:

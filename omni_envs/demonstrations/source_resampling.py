@@ -31,8 +31,9 @@ def resample_source(source: SourceMotion, fps: float) -> SourceMotion:
     def both(flags: np.ndarray) -> np.ndarray:
         return flags[left] & flags[right]
 
-    poses = source.object_poses
-    source_poses = source.source_object_poses
+    def poses(at: np.ndarray | None) -> np.ndarray | None:
+        return None if at is None else resample_poses(at, source.fps, fps)
+
     contacts = {link: both(np.asarray(flags, bool)) for link, flags in source.contacts.items()}
     points = {
         link: np.where(
@@ -46,10 +47,9 @@ def resample_source(source: SourceMotion, fps: float) -> SourceMotion:
         source,
         fps=float(fps),
         keypoints=keypoints,
-        object_poses=None if poses is None else resample_poses(poses, source.fps, fps),
-        source_object_poses=None
-        if source_poses is None
-        else resample_poses(source_poses, source.fps, fps),
+        object_poses=poses(source.object_poses),
+        source_object_poses=poses(source.source_object_poses),
+        mesh_object_poses=poses(source.mesh_object_poses),
         stance={mode: both(np.asarray(flags, bool)) for mode, flags in source.stance.items()},
         contacts=contacts,
         contact_points=points,

@@ -113,7 +113,7 @@ def _take(
 def _decode(path: str | Path, name: str, array: np.ndarray) -> Any:
     leaf = name.rpartition("/")[2]
     try:
-        if leaf == "scene":
+        if leaf in ("scene", "original_scene"):
             return Scene.from_dict(json.loads(str(array)))
         if leaf == "provenance":
             return dict(json.loads(str(array)))

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
+import numpy as np
+
+from omni_envs import rotations
 from omni_envs.demonstrations import Demonstration, scale_demonstration
+from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.demonstrations.source_resampling import resample_source
+from omni_envs.demonstrations.variation import Variation, vary
 from omni_envs.errors import InvalidDataError
 from omni_envs.metrics import ReferenceReport, evaluate
+from omni_envs.metrics.playback import TARGETS, play
 from omni_envs.progress import ProgressCallback
 from omni_envs.references.key import content_hashes, reference_key, versions
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.reference import Reference
 from omni_envs.retargeting import RetargetOptions, refine, retarget
 from omni_envs.robots import Robot, get_robot
+from omni_envs.scenes import OBJECT
 
 STANCE = "default"
 """The stance set that a reference carries as its schedule."""
+
+# How deep (m) a variation may put the object into the ground, and into the nominal robot.
+_START_DEPTH, _START_OVERLAP = 2e-3, 0.05
 
 
 def make_reference(
@@ -25,6 +35,8 @@ def make_reference(
     *,
     fps: float = 50.0,
     options: RetargetOptions | None = None,
+    variation: Variation | None = None,
+    nominal: Reference | None = None,
     progress: ProgressCallback | None = None,
 ) -> Reference:
     """Makes a reference from a demonstration, with its proof.
@@ -34,20 +46,41 @@ def make_reference(
         robot: The robot or its name.
         fps: Frames per second of the reference.
         options: Settings of the retargeter.
+        variation: How the scene differs from that of the demonstration. The motion is then anchored
+            to the nominal one: where the object was changed, for the options' ``nominal_decay``;
+            where the terrain was, all the time.
+        nominal: For a variation, the reference of the unchanged scene with the same robot and rate;
+            made here where it is not given.
         progress: Called with (frames done, frames in all) while retargeting.
 
     Raises:
         UnknownNameError: No such robot.
-        InvalidDataError: The rate is not positive, or the demonstration cannot be used.
+        InvalidDataError: The rate is not positive, the demonstration cannot be used, or the
+            variation puts the object into the robot or the ground at the start.
+        InvalidOptionError: The variation changes what the scene lacks.
     """
     robot, options = get_robot(robot), options or RetargetOptions()
+    variation = variation or Variation()
+    varied, settings = variation != Variation(), options
     if not 0 < fps < float("inf"):
         raise InvalidDataError("Reference", "fps", "positive", str(fps))
     # The source is resampled, not the result: so the retargeter holds every constraint on every
     # frame of the reference, and interpolation cannot break one.
     source = resample_source(scale_demonstration(demonstration, robot.height), fps)
     passes = 2 if options.refine else 1
-    motion = retarget(source, robot, options, _share(progress, source.num_frames, 0, passes))
+    anchor = None
+    if varied:
+        if nominal is None:
+            nominal = make_reference(demonstration, robot, fps=fps, options=options)
+        anchor, original = nominal.qpos, source
+        source = vary(original, variation)
+        if variation.shapes_terrain:
+            options = replace(options, nominal_decay=None)
+        _check_ground(original, source)
+        _check_robot(robot, source, anchor)
+    motion = retarget(
+        source, robot, options, _share(progress, source.num_frames, 0, passes), nominal=anchor
+    )
     if options.refine:
         motion = refine(motion, progress=_share(progress, source.num_frames, 1, passes))
     report = evaluate(
@@ -70,19 +103,63 @@ def make_reference(
         report=report,
         source=motion.source,
         provenance={
-            "demonstration": demonstration.name,
+            "demonstration": motion.source.name,
             "source": demonstration.source,
             "licence": demonstration.licence,
             "robot": robot.name,
             "options": asdict(options),
             "fps": float(fps),
+            "variation": asdict(variation) if varied else None,
             "versions": versions(),
-            "hashes": content_hashes(demonstration, robot, fps, options),
-            "key": reference_key(demonstration, robot, fps, options),
+            "hashes": content_hashes(demonstration, robot, fps, settings, variation),
+            "key": reference_key(demonstration, robot, fps, settings, variation),
             "solved_frames": motion.num_frames,
             "solve_seconds": float(motion.frames.seconds.sum()),
         },
     )
+
+
+def _check_ground(nominal: SourceMotion, varied: SourceMotion) -> None:
+    """Refuses a variation that starts with the object in the ground.
+
+    Recordings may start with it a few millimetres deep; what counts is what is added.
+    """
+    before, after = (_depth_in_ground(motion) for motion in (nominal, varied))
+    if after > max(before, 0.0) + _START_DEPTH:
+        raise InvalidDataError(
+            f"Variation {varied.name!r}",
+            "object",
+            "above the ground at the start",
+            f"{100 * after:.1f} cm in it",
+        )
+
+
+def _depth_in_ground(source: SourceMotion) -> float:
+    if source.scene.object is None or source.object_poses is None:
+        return 0.0
+    pose = source.object_poses[0]
+    corners = np.asarray(source.scene.object.surface().vertices)
+    turned = rotations.rotate(np.tile(pose[3:], (len(corners), 1)), corners)
+    return -float(pose[2] + turned[:, 2].min())
+
+
+def _check_robot(robot: Robot, varied: SourceMotion, qpos: np.ndarray) -> None:
+    """Refuses a variation that puts the object where the nominal robot stands at the start.
+
+    A little is for the solver to resolve: the robot leans back or steps aside.
+    """
+    if varied.scene.object is None or varied.object_poses is None:
+        return
+    start = play(robot, varied.scene, varied.fps, qpos[:1], varied.object_poses[:1])
+    depth = np.where(start.target == TARGETS.index(OBJECT), -start.distance, -np.inf)
+    if depth.max(initial=0.0) > _START_OVERLAP:
+        deepest = int(np.argmax(depth))
+        raise InvalidDataError(
+            f"Variation {varied.name!r}",
+            "object",
+            "outside of the robot at the start",
+            f"{100 * depth[deepest]:.1f} cm in {start.body_names[start.body[deepest]]}",
+        )
 
 
 def _share(

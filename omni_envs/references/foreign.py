@@ -125,6 +125,7 @@ def _first_frames(source: SourceMotion, frames: int) -> SourceMotion:
         keypoints=source.keypoints[:frames],
         object_poses=cut(source.object_poses),
         source_object_poses=cut(source.source_object_poses),
+        mesh_object_poses=cut(source.mesh_object_poses),
         stance={k: v[:frames] for k, v in source.stance.items()},
         contacts={k: v[:frames] for k, v in source.contacts.items()},
         contact_points={k: v[:frames] for k, v in source.contact_points.items()},

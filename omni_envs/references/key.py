@@ -14,6 +14,7 @@ import numpy as np
 
 import omni_envs
 from omni_envs.demonstrations import Demonstration
+from omni_envs.demonstrations.variation import Variation
 from omni_envs.references.archive import FORMAT
 from omni_envs.references.npz import digest
 from omni_envs.retargeting import RetargetOptions
@@ -30,23 +31,32 @@ def versions() -> dict[str, str]:
 
 
 def content_hashes(
-    demonstration: Demonstration, robot: Robot, fps: float, options: RetargetOptions
+    demonstration: Demonstration,
+    robot: Robot,
+    fps: float,
+    options: RetargetOptions,
+    variation: Variation | None = None,
 ) -> dict[str, str]:
-    """Returns the SHA-256 of demonstration, scene, robot, settings and code."""
+    """Returns the SHA-256 of demonstration, scene, robot, settings, variation and code."""
     return {
         "demonstration": _hash(demonstration),
         "scene": _hash(demonstration.scene),
         "robot": _hash(robot),
         "settings": _hash({"options": options, "fps": float(fps), "versions": versions()}),
+        "variation": _hash(variation or Variation()),
         "code": _code(),
     }
 
 
 def reference_key(
-    demonstration: Demonstration, robot: Robot, fps: float, options: RetargetOptions
+    demonstration: Demonstration,
+    robot: Robot,
+    fps: float,
+    options: RetargetOptions,
+    variation: Variation | None = None,
 ) -> str:
     """Returns one hash of all that a reference depends on, code and versions included."""
-    hashes = content_hashes(demonstration, robot, fps, options)
+    hashes = content_hashes(demonstration, robot, fps, options, variation)
     return hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest()
 
 

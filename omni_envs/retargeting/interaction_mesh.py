@@ -142,11 +142,12 @@ class InteractionMesh:
     @classmethod
     def of(cls, source: SourceMotion, count: int = 100) -> InteractionMesh:
         """The mesh of a source motion with ``count`` surface points."""
+        poses = source.object_poses
         return cls.build(
             source.keypoints,
             surface_points(source, count),
             source.source_object_poses,
-            source.object_poses,
+            poses if source.mesh_object_poses is None else source.mesh_object_poses,
             source.scale,
         )
 

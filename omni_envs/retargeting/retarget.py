@@ -344,6 +344,7 @@ class _Retargeter:
             self.configuration.update(self.nominal_motion[0])
             start = foot_wishes(self.configuration.feet()[None, :, :, :2])
             standing = np.logical_and.accumulate(tier == ANCHORED)
+            first = self.nominal_motion[0]
             wishes.tips[standing] = np.broadcast_to(start.tips, wishes.tips.shape)[standing]
             turn = start.headings - wishes.headings[:1]
             same = start.headings - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))

@@ -40,29 +40,43 @@ def surface_points(source: SourceMotion, count: int) -> SurfacePoints:
         source: The motion.
         count: Number of points on object or terrain.
     """
-    scene = source.scene
-    if scene.object is not None:
-        points = _spread(scene.object.surface(), count, top_weight=1.0)
-        return SurfacePoints(points * source.scale, points)
-    if scene.terrain is not None:
-        points = _spread(scene.terrain.surface(), count, top_weight=_TOP_WEIGHT)
-        return SurfacePoints(points, points)
+    target = source.scene
+    original = source.original_scene or target
+    if original.object is not None and target.object is not None:
+        at = _spread(original.object.surface(), count, top_weight=1.0)
+        points = at.on(original.object.surface())
+        return SurfacePoints(points * source.scale, at.on(target.object.surface()))
+    if original.terrain is not None and target.terrain is not None:
+        at = _spread(original.terrain.surface(), count, top_weight=_TOP_WEIGHT)
+        return SurfacePoints(at.on(original.terrain.surface()), at.on(target.terrain.surface()))
     points = _ground(source.keypoints[:, 0, :2], _GROUND_SPACING * source.scale)
     return SurfacePoints(points, points)
 
 
-def _spread(surface: trimesh.Trimesh, count: int, top_weight: float) -> np.ndarray:
-    """(count, 3) evenly spread points: farthest-point choice among random ones."""
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """(N,) faces and (N, 3) barycentric weights: places that a surface of another size has too."""
+
+    faces: np.ndarray
+    weights: np.ndarray
+
+    def on(self, surface: trimesh.Trimesh) -> np.ndarray:
+        """(N, 3) points of a surface."""
+        return np.einsum("nk,nkd->nd", self.weights, surface.triangles[self.faces])
+
+
+def _spread(surface: trimesh.Trimesh, count: int, top_weight: float) -> _Places:
+    """``count`` evenly spread places: farthest-point choice among random ones."""
     rng = np.random.default_rng(0)
     normals, areas = surface.face_normals, surface.area_faces
     face = rng.choice(len(areas), size=30 * count, p=areas / areas.sum())
     u, v = np.sqrt(rng.random(face.size)), rng.random(face.size)
-    corners = surface.triangles[face]
     weights = np.stack([1 - u, u * (1 - v), u * v], axis=1)
-    candidates = np.einsum("nk,nkd->nd", weights, corners)
+    candidates = _Places(face, weights).on(surface)
     # Density goes with the inverse square of the spacing.
     stretch = np.where(normals[face, 2] > 0.7, np.sqrt(top_weight), 1.0)
-    return candidates[kernels.farthest_points(candidates, stretch, count)]
+    chosen = kernels.farthest_points(candidates, stretch, count)
+    return _Places(face[chosen], weights[chosen])
 
 
 def _ground(centres: np.ndarray, spacing: float) -> np.ndarray:

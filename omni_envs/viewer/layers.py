@@ -57,7 +57,8 @@ def mesh_edges(source: SourceMotion, frame: int) -> np.ndarray:
     target, local = _of_frame(points.target, frame), source.keypoints[frame]
     world = target
     if source.source_object_poses is not None and source.object_poses is not None:
-        here, there = source.source_object_poses[frame], source.object_poses[frame]
+        seen = source.object_poses if source.mesh_object_poses is None else source.mesh_object_poses
+        here, there = source.source_object_poses[frame], seen[frame]
         turn = np.broadcast_to(rotations.conjugate(here[3:]), (len(local), 4))
         local = rotations.rotate(turn, local - here[:3])
         turn = np.broadcast_to(there[3:], (len(target), 4))

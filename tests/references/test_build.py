@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from omni_envs.demonstrations import builtin_demonstration
+from omni_envs.demonstrations import Variation, builtin_demonstration
 from omni_envs.errors import InvalidDataError, UnknownNameError
 from omni_envs.references import Reference, evaluate_reference, make_reference
 from omni_envs.references.key import reference_key
@@ -22,6 +22,11 @@ def demonstration():
         orientations=None if whole.orientations is None else whole.orientations[part],
         contacts={link: flags[part] for link, flags in whole.contacts.items()},
     )
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return make_reference(builtin_demonstration("box_carry"), "g1", fps=30.0)
 
 
 @pytest.fixture(scope="module")
@@ -103,3 +108,34 @@ def test_bad_arguments_are_refused(demonstration):
         make_reference(demonstration, "r2d2")
     with pytest.raises(InvalidDataError, match="fps"):
         make_reference(demonstration, "g1", fps=0.0)
+
+
+def test_variation_starts_where_asked_and_holds_the_constraints(whole):
+    demonstration = builtin_demonstration("box_carry")
+    variation = Variation(object_translation=(0.0, 0.2), object_yaw=np.pi / 4)
+    nominal = whole
+    varied = make_reference(demonstration, "g1", fps=30.0, variation=variation, nominal=nominal)
+    start = varied.object_poses[0, :3] - nominal.object_poses[0, :3]
+    assert np.linalg.norm(start) == pytest.approx(0.2) and start[2] == 0
+    end = varied.object_poses[-1, :3] - nominal.object_poses[-1, :3]
+    assert np.linalg.norm(end) < 0.02
+    summary = varied.report.summary()
+    assert summary["penetration_max_m"] < 1e-3 and summary["contact_clean_fraction"] > 0.98
+    assert summary["slip_fraction_text"] <= 0.01 and summary["joint_violation_max_rad"] == 0
+    # The robot goes to the box: base and legs alone stay near the nominal motion at the start.
+    assert np.abs(varied.qpos[0, :7] - nominal.qpos[0, :7]).max() < 0.1
+    assert varied.provenance["variation"]["object_yaw"] == pytest.approx(np.pi / 4)
+    assert varied.provenance["key"] != nominal.provenance["key"]
+
+
+def test_a_variation_inside_of_the_robot_is_refused(whole):
+    pose = whole.object_poses[0]
+    reach = float(np.linalg.norm(pose[:2] - whole.qpos[0, :2]))
+    with pytest.raises(InvalidDataError, match="outside of the robot at the start"):
+        make_reference(
+            builtin_demonstration("box_carry"),
+            "g1",
+            fps=30.0,
+            variation=Variation(object_translation=(-reach, 0.0), object_scale=(1.0, 1.0, 3.0)),
+            nominal=whole,
+        )
