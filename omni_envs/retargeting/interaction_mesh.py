@@ -51,6 +51,10 @@ class Connectivity:
     points: np.ndarray
     bits: np.ndarray
 
+    def adjacency(self, frame: int) -> np.ndarray:
+        """(V, V) bool, who is whose neighbour on one frame."""
+        return np.unpackbits(self.bits[frame], axis=-1, count=self.points.shape[1]).astype(bool)
+
 
 def connect(points: np.ndarray) -> Connectivity:
     """Connects (T, V, 3) points by one Delaunay mesh per frame."""

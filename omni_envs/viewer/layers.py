@@ -65,7 +65,7 @@ def mesh_edges(source: SourceMotion, frame: int) -> np.ndarray:
         world = there[:3] + rotations.rotate(turn, target)
     vertices = np.concatenate([local, _of_frame(points.source, frame)])
     body = len(local)
-    adjacent = connect(vertices[None]).laplacians(slice(0, 1))[0, :body] < 0
+    adjacent = connect(vertices[None]).adjacency(0)[:body]
     first, second = np.nonzero(adjacent)
     once = (second >= body) | (first < second)
     shown = np.concatenate([source.keypoints[frame], world])
