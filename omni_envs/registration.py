@@ -34,7 +34,7 @@ class EnvId:
 
 
 _ROBOTS = {"g1": "G1", "h1": "H1", "t1": "T1"}
-_TASKS = {"box_carry": "BoxCarry", "climb": "Climb", "track": "Track"}
+_TASKS = {"box_carry": "BoxCarry", "climb": "Climb", "crawl": "Crawl", "track": "Track"}
 
 ENVIRONMENTS = tuple(
     EnvId(robot, robot_label, task, task_label)

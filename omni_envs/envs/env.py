@@ -32,6 +32,7 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     |----------|-----------------------------------------------------------|--------------------|
     | BoxCarry | walks up, lifts a box, carries it, puts it down           | hands, feet        |
     | Climb    | up a platform of 70 % of its height, and down again       | hands, knees, feet |
+    | Crawl    | up a slope on hands and knees, and stands on the block    | hands, knees, feet |
     | Track    | none: ``reference=`` is needed                            | hands, feet        |
 
     **Action**: ``Box(-10, 10, (n,))``. The target of joint j is default_j + scale_j · a_j with

@@ -43,8 +43,8 @@ def resolve_references(
 
         if task.demonstration is None:
             raise InvalidOptionError(
-                f"reference: the task {task.name!r} tracks what it is given; name a reference file, "
-                "a Reference or a Demonstration."
+                f"reference: the task {task.name!r} tracks what it is given; name a reference "
+                "file, a Reference or a Demonstration."
             )
         source = builtin_demonstration(task.demonstration)
     if isinstance(source, str | Path | Reference | Demonstration):

@@ -40,6 +40,7 @@ TASKS = {
     for task in (
         Task("box_carry", "BoxCarry", "box_carry"),
         Task("climb", "Climb", "climb", _AND_KNEES),
+        Task("crawl", "Crawl", "crawl", _AND_KNEES),
         Task("track", "Track", None),
     )
 }

@@ -5,6 +5,7 @@ import pytest
 
 from omni_envs.demonstrations import builtin_demonstration, builtin_names
 from omni_envs.envs import OmniEnv, OmniVectorEnv
+from omni_envs.envs.task import TrackingTask
 from omni_envs.envs.tasks import TASKS, get_task
 from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.references import make_reference
@@ -74,7 +75,8 @@ def test_playback_earns_every_tracking_term_in_full(robot, task, start, stop, qu
     expected = env._library.frames(frames)
     action, forces = np.zeros((12, env.robot.num_joints)), np.zeros((12, 1, 4, 3))
     state = env.simulation
-    judged = env._task.judge(state.qpos, state.bodies(), expected, action, action, forces, True)
+    judge = TrackingTask(env.robot, env.config, reference.object_poses is not None).judge
+    judged = judge(state.qpos, state.bodies(), expected, action, action, forces, True)
     terms = [n for n in TRACKING_TERMS if n in judged.terms]
     assert len(terms) == (8 if reference.object_poses is not None else 6)
     for name in terms:

@@ -6,10 +6,15 @@ from collections.abc import Callable
 
 from omni_envs.demonstrations.builtin.box_carry import box_carry
 from omni_envs.demonstrations.builtin.climb import climb
+from omni_envs.demonstrations.builtin.crawl import crawl
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.errors import UnknownNameError
 
-_MAKERS: dict[str, Callable[[], Demonstration]] = {"box_carry": box_carry, "climb": climb}
+_MAKERS: dict[str, Callable[[], Demonstration]] = {
+    "box_carry": box_carry,
+    "climb": climb,
+    "crawl": crawl,
+}
 
 
 def builtin_names() -> tuple[str, ...]:

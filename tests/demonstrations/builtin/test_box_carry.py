@@ -47,7 +47,7 @@ def norm(v):
 
 
 def test_names_and_unknown_name():
-    assert builtin_names() == ("box_carry", "climb")
+    assert builtin_names() == ("box_carry", "climb", "crawl")
     with pytest.raises(UnknownNameError, match="box_carry"):
         builtin_demonstration("box_cary")
 
