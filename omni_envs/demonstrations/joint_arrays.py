@@ -153,7 +153,7 @@ def _names(path: Path, arrays: dict[str, np.ndarray], joints: int) -> tuple[str,
 def _nameless(recording: Recording, options: SourceOptions) -> SkeletonMap:
     path, count = recording.path, recording.positions.shape[1]
     if options.skeleton is not None:
-        joints = skeleton_map(options.skeleton, (), path)
+        joints = skeleton_map(options.skeleton, (), path, count)
         if joints.joint_names is None or len(joints.joint_names) != count:
             found = "none" if joints.joint_names is None else f"{len(joints.joint_names)}"
             raise FileFormatError(path, "skeleton", f"joint_names for {count} joints", found)

@@ -26,7 +26,7 @@ class Naming:
         limbs: Patterns of hip, knee, ankle, toe, shoulder, elbow and hand.
         head_top: Joints that may mark the top of the head.
         hallmark: A joint that must be there as well, to tell two namings apart.
-        order: Order of the joints in arrays without names.
+        orders: Orders of the joints in arrays without names.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Naming:
     limbs: tuple[str, str, str, str, str, str, str]
     head_top: tuple[str, ...] = ()
     hallmark: str | None = None
-    order: tuple[str, ...] | None = None
+    orders: tuple[tuple[str, ...], ...] = ()
 
     def keypoints(self) -> dict[str, str]:
         """For every keypoint the joint that plays it."""
@@ -55,6 +55,20 @@ SMPL_BODY = (
 )
 """The 22 joints that every model of the SMPL family begins with."""
 
+_FINGERS = tuple(
+    f"{side}_{finger}{i}"
+    for side in "LR"
+    for finger in ("Index", "Middle", "Pinky", "Ring", "Thumb")
+    for i in (1, 2, 3)
+)
+SMPL_ORDERS = {
+    22: SMPL_BODY,
+    24: (*SMPL_BODY, "L_Hand", "R_Hand"),
+    52: (*SMPL_BODY, *_FINGERS),
+    55: (*SMPL_BODY, "Jaw", "L_Eye", "R_Eye", *_FINGERS),
+}
+"""Joints of the body alone, of SMPL, SMPL-H and SMPL-X, by their number."""
+
 _LAFAN1 = (
     *("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToe", "RightUpLeg", "RightLeg"),
     *("RightFoot", "RightToe", "Spine", "Spine1", "Spine2", "Neck", "Head", "LeftShoulder"),
@@ -73,7 +87,7 @@ NAMINGS: tuple[Naming, ...] = (
         "Ubisoft LAFAN1",
         "Hips",
         (*_MOTION_BUILDER[:3], "{Left}Toe", *_MOTION_BUILDER[4:]),
-        order=_LAFAN1,
+        orders=(_LAFAN1,),
     ),
     Naming("accad", "ACCAD, Ohio State", "Hips", _MOTION_BUILDER, _HEAD_TOPS, "ToSpine"),
     Naming("cmu", "CMU, MotionBuilder names", "Hips", _MOTION_BUILDER, _HEAD_TOPS, "LHipJoint"),
@@ -122,7 +136,7 @@ NAMINGS: tuple[Naming, ...] = (
             *("{L}_Hip", "{L}_Knee", "{L}_Ankle", "{L}_Foot"),
             *("{L}_Shoulder", "{L}_Elbow", "{L}_Wrist"),
         ),
-        order=SMPL_BODY,
+        orders=tuple(SMPL_ORDERS.values()),
     ),
     Naming(
         "smplx",
@@ -186,13 +200,16 @@ def recognise(joint_names: Sequence[str]) -> SkeletonMap | None:
     return None
 
 
-def skeleton_map(skeleton: str | Path, joint_names: Sequence[str], path: Path) -> SkeletonMap:
+def skeleton_map(
+    skeleton: str | Path, joint_names: Sequence[str], path: Path, joints: int | None = None
+) -> SkeletonMap:
     """The map that a user asked for: a known name or a YAML file.
 
     Args:
         skeleton: Name of ``skeleton_names()``, or a YAML file.
         joint_names: Joints of the file; empty for an array without names.
         path: The file, for error messages.
+        joints: Number of joints of an array without names.
 
     Raises:
         UnknownNameError: Neither a known name nor a file.
@@ -203,8 +220,9 @@ def skeleton_map(skeleton: str | Path, joint_names: Sequence[str], path: Path) -
         return _map_of(name, _KNOWN[name])
     for naming in NAMINGS:
         if naming.name == name:
-            if not joint_names and naming.order is not None:
-                return SkeletonMap(name, naming.keypoints(), joint_names=naming.order)
+            if not joint_names and naming.orders:
+                order = next((o for o in naming.orders if len(o) == joints), naming.orders[0])
+                return SkeletonMap(name, naming.keypoints(), joint_names=order)
             found = _follow(naming, joint_names)
             if found is not None:
                 return found
@@ -220,9 +238,10 @@ def nameless_orders(joints: int) -> list[SkeletonMap]:
     """Known orders of joints for arrays of ``joints`` joints without names."""
     orders = [_map_of(name, s) for name, s in _KNOWN.items() if s.num_joints == joints]
     return orders + [
-        SkeletonMap(naming.name, naming.keypoints(), joint_names=naming.order)
+        SkeletonMap(naming.name, naming.keypoints(), joint_names=order)
         for naming in NAMINGS
-        if naming.order is not None and len(naming.order) == joints
+        for order in naming.orders
+        if len(order) == joints
     ]
 
 

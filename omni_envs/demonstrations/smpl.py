@@ -11,7 +11,7 @@ import numpy as np
 from omni_envs.demonstrations.arrays import read_npz_members
 from omni_envs.demonstrations.body_model import WHERE, BodyModel, load_body_model, pose_joints
 from omni_envs.demonstrations.demonstration import Demonstration
-from omni_envs.demonstrations.namings import SMPL_BODY
+from omni_envs.demonstrations.namings import SMPL_ORDERS
 from omni_envs.demonstrations.recording import (
     Recording,
     find_conventions,
@@ -30,14 +30,6 @@ KEYS = (
 _RATES = ("mocap_frame_rate", "mocap_framerate", "fps")
 _KINDS = {72: "smpl", 156: "smplh", 165: "smplx"}
 _JOINTS = {"smpl": 24, "smplh": 52, "smplx": 55}
-_HAND = tuple(f"{f}{i}" for f in ("Index", "Middle", "Pinky", "Ring", "Thumb") for i in (1, 2, 3))
-_HANDS = tuple(f"{side}_{joint}" for side in "LR" for joint in _HAND)
-JOINT_NAMES = {
-    24: (*SMPL_BODY, "L_Hand", "R_Hand"),
-    52: (*SMPL_BODY, *_HANDS),
-    55: (*SMPL_BODY, "Jaw", "L_Eye", "R_Eye", *_HANDS),
-}
-"""Joints of the models by their number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +173,7 @@ def pose_body(
         FileFormatError: The model cannot be used, or is of another kind than the parameters.
     """
     model: BodyModel = load_body_model(body_model, parameters.kind, parameters.gender)
-    if model.num_joints not in JOINT_NAMES:
+    if model.num_joints not in SMPL_ORDERS:
         expected = ", ".join(f"{n} ({k})" for k, n in _JOINTS.items())
         raise FileFormatError(model.path, "joints", expected, str(model.num_joints))
     if parameters.kind is not None and _JOINTS[parameters.kind] != model.num_joints:
@@ -190,7 +182,7 @@ def pose_body(
         raise FileFormatError(model.path, "body model", expected, found)
     rest, height = model.rest(parameters.betas)
     positions = pose_joints(rest, model.parents, parameters.turns, parameters.translation)
-    names = JOINT_NAMES[model.num_joints]
+    names = SMPL_ORDERS[model.num_joints]
     # The rest pose stands y up whatever the motion does, so it says nothing about the axes.
     return Recording(path, names, positions, kept_fps(parameters.fps), model.parents), height
 

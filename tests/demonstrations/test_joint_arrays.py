@@ -153,3 +153,16 @@ def test_a_million_frames(tmp_path, person):
     assert part.num_frames == who.frames
     del long
     path.unlink()
+
+
+@pytest.mark.parametrize("joints", [22, 24, 52])
+def test_orders_of_the_smpl_family(person, smpl_parameters, write_body, tmp_path, joints):
+    """Told from LAFAN1's 22 and InterMimic's 52 by bones that keep a human length."""
+    np.savez(tmp_path / "smpl.npz", **smpl_parameters(person()))
+    body = write_body(tmp_path / "body.npz")
+    posed = load_demonstration(tmp_path / "smpl.npz", body_model=body)
+    np.save(tmp_path / "clip.npy", posed.positions[:, :joints])
+    for skeleton in (None, "smpl"):
+        demo = load_demonstration(tmp_path / "clip.npy", fps=30.0, skeleton=skeleton)
+        np.testing.assert_allclose(demo.keypoints, posed.keypoints, atol=1e-9)
+    assert demo.joint_names[:3] == ("Pelvis", "L_Hip", "R_Hip")

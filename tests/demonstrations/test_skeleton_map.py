@@ -92,8 +92,8 @@ def test_namings_recognise_themselves_and_no_other(naming):
     assert set(found.keypoints) == set(KEYPOINTS)
     assert naming.name in skeleton_names()
     assert recognise([*naming.keypoints().values(), *extra][1:]) is None
-    if naming.order is not None:
-        assert set(found.keypoints.values()) <= {*naming.order}
+    for order in naming.orders:
+        assert set(found.keypoints.values()) <= {*order} and len({*order}) == len(order)
 
 
 def test_namespaces_and_shared_prefixes_are_dropped():
