@@ -47,7 +47,7 @@ class RefineOptions:
     """
 
     acceleration_weight: float = 5e-6
-    radii: tuple[float, ...] = (0.4, 0.1, 0.02)
+    radii: tuple[float, ...] = (0.4, 0.05, 0.01)
     tolerance: float = 1e-5
 
     def __post_init__(self) -> None:

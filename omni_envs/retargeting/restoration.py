@@ -22,6 +22,9 @@ KINDS = (STANCE, SELF, CONTACT)  # as they are numbered
 # Rows that contradict each other by a hair are met by absurd steps otherwise: two windows that want
 # a flat foot 0.1 mm shorter turn it by 2°.
 _REACH, _SHORTEST, _LONGEST = 30.0, 1e-3, 0.1
+# Weight of the way of planted feet: within its window, a foot moved now is in the way of the next
+# frame.
+_PLANTED = 30.0
 _, _GIVES_WAY = softness(np.array(KINDS))
 
 
@@ -80,7 +83,9 @@ def restore(
         lower, upper = step_bounds(configuration, bounds)
         np.maximum(lower, -reach, out=lower)
         np.maximum(np.minimum(upper, reach), lower, out=upper)
-        dq, soft = solver(StepQP(np.diag(metric), zero, lower, upper, rows, metric, np.inf))
+        feet = rows.A[rows.kind == STANCE]
+        H = np.diag(metric) + _PLANTED * (feet.T @ feet)
+        dq, soft = solver(StepQP(H, zero, lower, upper, rows, metric, np.inf))
         configuration.update(configuration.step(dq))
     if merit > lowest:
         configuration.update(kept)
