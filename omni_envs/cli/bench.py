@@ -119,6 +119,41 @@ class BenchRetarget:
 
 
 @dataclass
+class BenchParallel:
+    """Speed of many references over processes beside one process, start-up included."""
+
+    sources: tyro.conf.Positional[tuple[str, ...]] = ("box_carry",)
+    """Demonstration files, or names of built-in demonstrations."""
+
+    robot: str = "g1"
+    """Name of the robot."""
+
+    jobs: int = 2
+    """Processes to compare with one."""
+
+    items: int = 12
+    """References in the batch: the sources in turn, each again at another pace."""
+
+    repeats: int = 1
+    """Runs; the median counts."""
+
+    json: bool = False
+    """Print JSON."""
+
+    def run(self) -> None:  # noqa: D102
+        from omni_envs.benchmarks.parallel import bench_parallel
+
+        rows = bench_parallel(
+            self.sources,
+            robot=self.robot,
+            jobs=self.jobs,
+            items=self.items,
+            repeats=self.repeats,
+        )
+        show(f"{self.items} references over {self.jobs} processes", rows, self.json)
+
+
+@dataclass
 class Bench:
     """Figures of speed, ratios measured in the same run."""
 
@@ -126,6 +161,7 @@ class Bench:
         Annotated[BenchStep, tyro.conf.subcommand("step")]
         | Annotated[BenchSoak, tyro.conf.subcommand("soak")]
         | Annotated[BenchRetarget, tyro.conf.subcommand("retarget")]
+        | Annotated[BenchParallel, tyro.conf.subcommand("parallel")]
     )
 
     def run(self) -> None:  # noqa: D102

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from multiprocessing.context import BaseContext
 from typing import Any
 
 from omni_envs.demonstrations import Demonstration
@@ -18,6 +19,7 @@ from omni_envs.robots import Robot, get_robot, register_robot, robot_names
 from omni_envs.threads import one_maths_thread
 
 _POLL_SECONDS = 0.2
+_MODULE = "omni_envs.references.parallel"
 
 _counter: Any = None
 """In a worker: the count of solved frames, shared by all processes."""
@@ -55,15 +57,16 @@ def make_references(
     if jobs < 1:
         raise InvalidOptionError(f"jobs must be at least 1; got {jobs}.")
     jobs = min(jobs, max(len(demonstrations), 1))
-    total = sum(max(round(d.num_frames * fps / d.fps), 1) for d in demonstrations)
-    context = multiprocessing.get_context("spawn")
+    frames = [max(round(d.num_frames * fps / d.fps), 1) for d in demonstrations]
+    total = sum(frames)
+    context = worker_context()
     counter = context.Value("q", 0)
     with (
         one_maths_thread(),
         ProcessPoolExecutor(jobs, context, _start_worker, (counter, robot)) as pool,
     ):
         # Long clips first, so that no process ends up alone with one.
-        order = sorted(range(len(demonstrations)), key=lambda i: -demonstrations[i].num_frames)
+        order = sorted(range(len(demonstrations)), key=lambda i: -frames[i])
         futures: dict[int, Future[Reference | OmniEnvsError]] = {
             i: pool.submit(_make, demonstrations[i], robot, fps, options) for i in order
         }
@@ -73,6 +76,18 @@ def make_references(
             if progress is not None:
                 progress(min(counter.value, total) if pending else total, total)
         return [futures[i].result() for i in range(len(demonstrations))]
+
+
+def worker_context() -> BaseContext:
+    """How workers are started: from a server that has imported all they need, where there is one.
+
+    Importing takes longer than a short clip. The server does it once, and stays for later calls.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_MODULE])
+    return context
 
 
 def _start_worker(counter: Any, robot: Robot) -> None:

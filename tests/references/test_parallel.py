@@ -1,3 +1,6 @@
+import multiprocessing
+import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -5,7 +8,7 @@ import pytest
 
 from omni_envs.demonstrations import builtin_demonstration
 from omni_envs.errors import InvalidOptionError, OmniEnvsError
-from omni_envs.references import make_reference, make_references
+from omni_envs.references import make_reference, make_references, parallel
 from omni_envs.retargeting import RetargetOptions
 
 FAST = RetargetOptions(refine=False)
@@ -56,3 +59,17 @@ def test_no_demonstration_is_no_reference():
 def test_jobs_are_checked(jobs):
     with pytest.raises(InvalidOptionError, match="jobs"):
         make_references([], "g1", jobs=jobs)
+
+
+def test_workers_come_from_a_server_that_has_imported_what_they_need():
+    context = parallel.worker_context()
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        pytest.skip("no fork server on this system")
+    assert context.get_start_method() == "forkserver"
+    with ProcessPoolExecutor(1, context) as pool:
+        first = pool.submit(_imported, "omni_envs.references.parallel").result()
+        assert first and pool.submit(_imported, "numba").result()
+
+
+def _imported(module):
+    return module in sys.modules
