@@ -36,12 +36,13 @@ STAGES = {
     "solver": "qp",
     "stance_plan": "footholds",
     "frame_solver": "loop",
+    "restoration": "restoration",
     "retarget": "loop",
 }
 """Module of ``omni_envs.retargeting`` to the stage its own time counts for; the others, all tasks
 and limits, are ``"assembly"`` of the quadratic program."""
 
-WHOLE_STAGES = {"_restore": "restoration", "_sketch": "footholds"}
+WHOLE_STAGES = {"restore": "restoration", "_sketch": "footholds"}
 """Functions whose whole time is one stage, callees included."""
 
 _T = TypeVar("_T")
