@@ -266,3 +266,17 @@ def test_stretched_feet_point_neither_way(person, write_bvh):
     for side in ("Left", "Right"):
         who.local[f"{side}Foot"] = Rotation.from_rotvec(np.tile([1.3, 0.0, 0.0], (who.frames, 1)))
     assert load_demonstration(write_bvh(who)).num_frames == 61
+
+
+@pytest.mark.parametrize("fps", [24.0, 25.0, 29.97, 50.0, 59.94, 90.0, 119.88])
+def test_every_rate_becomes_30(person, write_bvh, fps):
+    demo = load_demonstration(write_bvh(person(fps=fps)))
+    assert demo.fps == 30 and abs(demo.num_frames - 61) <= 1
+    slow = load_demonstration(write_bvh(person(fps=30.0)))
+    frames = min(demo.num_frames, slow.num_frames)
+    np.testing.assert_allclose(demo.keypoints[:frames], slow.keypoints[:frames], atol=4e-3)
+
+
+def test_a_single_frame(person, write_bvh):
+    demo = load_demonstration(write_bvh(person(seconds=0.0)))
+    assert demo.num_frames == 1 and scale_demonstration(demo, 1.32).num_frames == 1
