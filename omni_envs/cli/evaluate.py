@@ -8,14 +8,17 @@ from pathlib import Path
 
 import tyro
 
-from omni_envs.cli.output import show
+from omni_envs.cli.output import console
 from omni_envs.cli.source_flags import SourceFlags
 from omni_envs.errors import InvalidOptionError
 
 
 @dataclass
 class Evaluate:
-    """Metrics of references, ours or a peer's."""
+    """Metrics of references, ours or a peer's, held against the quality bars.
+
+    One table, a column per file; with --details every figure, with --json the numbers.
+    """
 
     references: tyro.conf.Positional[tuple[Path, ...]]
     """Reference files, or robot motions of OmniRetarget's dataset and holosoma (.npz)."""
@@ -39,6 +42,7 @@ class Evaluate:
     """Print JSON: one object per file, in a list if there are several files."""
 
     def run(self) -> None:  # noqa: D102
+        from omni_envs.metrics import bars_table, summary_table
         from omni_envs.references import evaluate_reference, open_reference, report_picture
 
         if self.picture is not None and len(self.references) != 1:
@@ -51,7 +55,17 @@ class Evaluate:
             if self.picture is not None:
                 report_picture(replace(reference, report=report), self.picture)
             rows.append(report.details() if self.details else report.summary())
-            if not self.json:
-                show(str(path), rows[-1], False)
         if self.json:
             print(json.dumps(rows[0] if len(rows) == 1 else rows, allow_nan=False))
+            return
+        columns = dict(zip(_headings(self.references), rows, strict=True))
+        console.print(summary_table(columns) if self.details else bars_table(columns))
+
+
+def _headings(paths: tuple[Path, ...]) -> list[str]:
+    """Names of the files, whole paths where names repeat, numbered where these do."""
+    names = [path.stem for path in paths]
+    if len(set(names)) < len(names):
+        names = [str(path) for path in paths]
+    repeated = len(set(names)) < len(names)
+    return [f"{i + 1} {name}" if repeated else name for i, name in enumerate(names)]

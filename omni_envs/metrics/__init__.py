@@ -1,13 +1,17 @@
 """How good a robot motion is."""
 
+from omni_envs.metrics.bars import BARS, Bar, bars_table
 from omni_envs.metrics.evaluate import evaluate
 from omni_envs.metrics.paper import PaperFigures, paper_figures, paper_row
 from omni_envs.metrics.report import ReferenceReport
 from omni_envs.metrics.summary import summary_table
 
 __all__ = [
+    "BARS",
+    "Bar",
     "PaperFigures",
     "ReferenceReport",
+    "bars_table",
     "evaluate",
     "paper_figures",
     "paper_row",

@@ -8,7 +8,8 @@ from omni_envs.references import Reference
 
 KEYS = {
     "frames", "fps", "penetration_max_m", "penetration_fraction_1mm", "slip_fraction_text",
-    "slip_fraction_default", "slip_max_code_m_s", "stance_drift_max_m", "self_penetration_max_m",
+    "slip_fraction_default", "slip_max_code_m_s", "stance_drift_max_m",
+    "stance_pivot_drift_max_m", "self_penetration_max_m",
     "joint_violation_max_rad", "velocity_violation_max_rad_s", "contact_fraction_2cm",
     "contact_clean_fraction", "contact_point_gap_mean_m", "energy_mean", "energy_max",
     "joint_acceleration_rms", "relaxed_frames",
@@ -66,6 +67,15 @@ def test_evaluate_compares_several_files(retargeted, capsys):
     assert main(["evaluate", str(retargeted), str(retargeted), "--json"]) == 0
     first, second = output(capsys)
     assert first == second
+
+
+def test_evaluate_holds_files_against_the_bars(retargeted, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "160")
+    assert main(["evaluate", str(retargeted), str(retargeted)]) == 0
+    table = capsys.readouterr().out
+    assert "contact-point gap" in table and "✓" in table
+    assert main(["evaluate", str(retargeted), "--details"]) == 0
+    assert "joint_jerk_rms" in capsys.readouterr().out
 
 
 def test_evaluate_takes_a_peers_motion(retargeted, tmp_path, capsys):

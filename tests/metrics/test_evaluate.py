@@ -18,6 +18,7 @@ KEYS = [
     "slip_fraction_default",
     "slip_max_code_m_s",
     "stance_drift_max_m",
+    "stance_pivot_drift_max_m",
     "self_penetration_max_m",
     "joint_violation_max_rad",
     "velocity_violation_max_rad_s",
