@@ -47,7 +47,7 @@ def test_a_file_is_proved_and_described(run):
     assert rows["closed_loop_return"] == pytest.approx(rows["closed_loop_return_network"], rel=1e-3)
     sidecar = json.loads(Path(rows["sidecar"]).read_text())
     assert sidecar["profile"] == "beyondmimic" and sidecar["robot"] == "g1"
-    assert sidecar["action"]["trained_as"] == "residual"
+    assert sidecar["action"]["trained_as"] == "feedforward"
     assert sidecar["checks"]["parity_max_abs"] == rows["parity_max_abs"]
 
 

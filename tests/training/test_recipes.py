@@ -41,7 +41,16 @@ def test_everything_can_be_overridden(tmp_path):
         seed=3,
     )
     assert config.num_envs == 7 and config.seed == 3 and config.ppo.epochs == 1
-    assert config.env_options == {"action": {"mode": "residual", "scale": 1.5}}
+    assert config.env_options == {"action": {"mode": "feedforward", "scale": 1.5}}
     assert config.ppo.hidden == RECIPES["small"].ppo.hidden
     with pytest.raises(InvalidOptionError, match="unknown"):
         RECIPES["small"].config("X", tmp_path, 5, sed=3)
+
+
+def test_what_grows_in_training_is_whole_in_the_evaluation():
+    recipe = RECIPES["small"]
+    trained = make_config(**merged(recipe.env_options, recipe.training_options))
+    evaluated = make_config(**evaluation_options(recipe.env_options))
+    assert trained.reset.growth is not None and evaluated.reset.growth is None
+    assert trained.reset.noise == evaluated.reset.noise == make_config().reset.noise
+    assert trained.randomization == evaluated.randomization == make_config().randomization
