@@ -22,7 +22,7 @@ from omni_envs.errors import MissingDependencyError, OmniEnvsError
 try:
     import torch
     from tensordict import TensorDictBase
-    from torch import nn
+    from torch import Tensor, nn
     from torch.distributions import kl_divergence
     from torchrl.modules import IndependentNormal, ProbabilisticActor, ValueOperator
     from torchrl.objectives import ClipPPOLoss
@@ -33,6 +33,18 @@ except ImportError as error:
 from omni_envs.training.config import PPOConfig
 from omni_envs.training.learning_rate import adapted_learning_rate
 from omni_envs.training.torchrl_network import TrackingNetwork
+
+
+class PolicyLoss(ClipPPOLoss):
+    """Keeps the newest distribution, so that its divergence costs no second forward pass."""
+
+    now: IndependentNormal
+
+    def _get_cur_log_prob(
+        self, *args: Any, **kwargs: Any
+    ) -> tuple[Tensor, IndependentNormal, bool]:
+        log_probability, self.now, composite = super()._get_cur_log_prob(*args, **kwargs)
+        return log_probability, self.now, composite
 
 
 class TensorDictPPO:
@@ -69,7 +81,7 @@ class TensorDictPPO:
             average_gae=True,
             deactivate_vmap=True,
         )
-        self.policy_loss = ClipPPOLoss(
+        self.policy_loss = PolicyLoss(
             actor,
             clip_epsilon=config.clip,
             entropy_coeff=config.entropy_weight,
@@ -156,7 +168,7 @@ class TensorDictPPO:
         (losses["loss_objective"] + losses["loss_entropy"]).backward()
         with torch.no_grad():
             acted = IndependentNormal(batch["loc"], batch["scale"]).base_dist
-            kl = kl_divergence(acted, self.actor.get_dist(batch.clone(False)).base_dist)
+            kl = kl_divergence(acted, self.policy_loss.now.base_dist)
         return {
             "kl": kl.sum(dim=-1).mean().item(),
             "surrogate_loss": losses["loss_objective"].item(),
