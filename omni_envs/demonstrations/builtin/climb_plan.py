@@ -84,8 +84,8 @@ def plan_ascent() -> Plan:
         FootMove(_LEFT, 4.1, 5.0, hanging, (-0.05, 0.0, 0.0)),
         FootMove(_LEFT, 5.0, 5.9, _over_edge((0.12, 0.17, top)), (-0.06, 0.16, 0.10)),
         FootMove(_RIGHT, 6.1, 7.1, _over_edge((0.14, -0.15, top)), (-0.10, -0.14, 0.14)),
-        FootMove(_LEFT, 7.6, 8.3, kneel(0.40, 0.14), (0.0, 0.0, 0.05)),
-        FootMove(_RIGHT, 8.5, 9.2, kneel(0.58, -0.13), (0.0, 0.0, 0.05)),
+        FootMove(_LEFT, 7.6, 8.3, kneel(0.40, 0.14), (0.0, 0.0, 0.08)),
+        FootMove(_RIGHT, 8.5, 9.2, kneel(0.58, -0.13), (0.0, 0.0, 0.08)),
         FootMove(_LEFT, 9.3, 9.8, kneel(0.58, 0.13), (0.0, 0.0, 0.05)),
         FootMove(_RIGHT, 11.2, 12.0, flat(0.88, -0.11, top), (0.0, -0.06, 0.08)),
         FootMove(_LEFT, 12.6, 13.4, flat(0.88, 0.10, top), (-0.04, 0.02, 0.06)),
@@ -134,8 +134,9 @@ def plan_ascent() -> Plan:
     return Plan((flat(-0.86, _SIDE), flat(-0.86, -_SIDE)), feet, hands, trunk, 14.2)
 
 
-def _over_edge(knee: Vector) -> FootPose:
-    """A foot that hangs over the edge while its knee rests behind it."""
+def _over_edge(knee: Vector, raised: float = np.deg2rad(22.0)) -> FootPose:
+    """A foot in the air behind the edge, its shin raised: it must not catch on the edge."""
     x, y, z = knee
-    foot = ankle_foot((x - human.SHIN + 0.01, y, z + KNEE_HEIGHT - 0.03), np.deg2rad(115.0))
+    back, up = human.SHIN * np.cos(raised), KNEE_HEIGHT + human.SHIN * np.sin(raised)
+    foot = ankle_foot((x - float(back), y, z + float(up)), np.deg2rad(115.0) + raised)
     return FootPose(foot.ball, pitch=foot.pitch, toes=1.0, knee=(x, y, z + KNEE_HEIGHT))
