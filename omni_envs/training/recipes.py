@@ -82,7 +82,7 @@ _QUICK = PPOConfig(
 # Actions are offsets from targets that nearly hold the reference by themselves: of everything that
 # is randomized only a disturbed start still fells the robot at once, so that grows with its skill.
 _FEEDFORWARD = {"action": {"mode": "feedforward"}}
-_GROWING = {**PRIVILEGED, "reset": {"growth": {"share": 0.5, "step": 0.02}}}
+_GROWING = {**PRIVILEGED, "reset": {"growth": {"share": 0.4, "step": 0.02}}}
 _SMALL = PPOConfig(
     rollout_steps=24,
     learning_rate=3e-4,
