@@ -225,7 +225,9 @@ def test_recorded_accad_clips(shared, clip):
         assert pelvis.min() > 0.05 and pelvis.max() < 0.3
         assert source.contacts["right_knee"].any()
         knees = source.keypoints[:, [KEYPOINTS.index(f"{s}_knee") for s in ("left", "right")], 2]
-        assert knees.min() == pytest.approx(0.04 * source.scale)
+        # But for a third of a second, knees come no lower than their radius.
+        lower = np.sort(knees.min(axis=1))
+        assert lower[10] == pytest.approx(0.04 * source.scale) and lower[0] > 0.02
     if "Walk" in clip:
         assert pelvis.min() > 0.65 and pelvis.max() < 0.8
         for foot, name in enumerate(("left_toe", "right_toe")):
