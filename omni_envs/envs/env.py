@@ -16,6 +16,8 @@ from omni_envs.envs.vector_env import RENDER_MODES, OmniVectorEnv
 from omni_envs.errors import InvalidDataError
 
 _OWN = ("num_envs", "num_threads", "autoreset_mode")
+# Libraries tell a vector environment by these.
+_VECTOR_ONLY = (*_OWN, "single_observation_space", "single_action_space", "closed")
 
 
 class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
@@ -185,7 +187,7 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
 
     def __getattr__(self, name: str) -> Any:
         """Attributes of the vector environment, such as ``robot`` or ``policy_layout``."""
-        if name.startswith("_") or name == "vector":
+        if name.startswith("_") or name == "vector" or name in _VECTOR_ONLY:
             raise AttributeError(name)
         return getattr(self.vector, name)
 

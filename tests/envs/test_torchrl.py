@@ -1,4 +1,4 @@
-"""The vector environment in TorchRL, which must see true terminal observations."""
+"""The environments in TorchRL's own wrappers, which must see true terminal observations."""
 
 import pytest
 from gymnasium.vector import AutoresetMode
@@ -6,6 +6,7 @@ from gymnasium.vector import AutoresetMode
 from omni_envs.envs import OmniVectorEnv
 
 torchrl_envs = pytest.importorskip("torchrl.envs")
+from torchrl.envs.utils import check_env_specs  # noqa: E402
 
 
 @pytest.mark.parametrize("privileged", [False, True])
@@ -28,3 +29,15 @@ def test_rollout_in_gym_wrapper(reference, privileged):
     going = ~ended[:, :-1]
     assert (rollout["next", key][:, :-1][going] == rollout[key][:, 1:][going]).all()
     wrapped.close()
+
+
+@pytest.mark.parametrize("privileged", [False, True])
+def test_single_environment_by_id(reference_file, privileged):
+    env = torchrl_envs.GymEnv(
+        "OmniEnvs/G1BoxCarry-v0", reference=reference_file, observation={"privileged": privileged}
+    )
+    check_env_specs(env)
+    rollout = env.rollout(200)
+    assert env.batch_size == () and rollout.ndim == 1
+    assert rollout["next", "done"].squeeze(-1).tolist() == [False] * (len(rollout) - 1) + [True]
+    env.close()
