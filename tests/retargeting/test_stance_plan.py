@@ -14,14 +14,14 @@ from omni_envs.retargeting.stance_plan import (
 OPTIONS = StanceOptions()
 
 
-def wishes(tips, headings=None, reach=None):
+def wishes(tips, headings=None, reach=None, lying=1.0):
     frames = len(tips)
     both = np.stack([tips, np.zeros_like(tips)], axis=1)
     return FootWishes(
         both,
         np.zeros((frames, 2)) if headings is None else np.stack([headings] * 2, axis=1),
         np.full((frames, 2), -0.1) if reach is None else np.stack([reach] * 2, axis=1),
-        np.ones((frames, 2)),
+        np.full((frames, 2), lying),
     )
 
 
@@ -65,6 +65,13 @@ def test_far_turns_and_rolls_are_let():
         tier, wishes(np.zeros((30, 2)), reach=np.linspace(-0.1, -0.05, 30)), 30.0, OPTIONS
     )
     assert roll.rolls[:, 0].all()
+
+
+def test_feet_on_their_side_are_held_whole():
+    tier = tiers(np.full(30, ANCHORED))
+    far = {"headings": np.linspace(0, 2, 30), "reach": np.linspace(-0.1, -0.05, 30)}
+    plan = plan_stance(tier, wishes(np.zeros((30, 2)), **far, lying=0.5), 30.0, OPTIONS)
+    assert not plan.turns.any() and not plan.rolls.any()
 
 
 def test_tiers_are_the_sources_sets(grasp):
