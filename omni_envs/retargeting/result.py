@@ -12,8 +12,8 @@ from omni_envs.retargeting.options import RetargetOptions
 RELAXATIONS = ("stance", "self_collision", "penetration")
 """Constraints that may give way where they contradict each other, the first to give way first.
 
-Joint and velocity limits are never relaxed: the previous frame satisfies both, so they never
-contradict.
+Speed limits would come next, joint limits never: a frame that stays as the last one satisfies both,
+so neither can contradict anything, and both hold on every frame even where all others give way.
 """
 
 
