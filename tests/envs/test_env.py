@@ -138,3 +138,13 @@ def test_the_table_of_actions_is_what_actions_do(env):
     env.step(np.ones(29))
     target = np.array(_column(table, 2), float) + np.array(_column(table, 3), float)
     np.testing.assert_allclose(env.simulation.ctrl[0], target, atol=5e-4)
+
+
+@pytest.mark.parametrize("privileged", [False, True])
+def test_sb3s_checker_passes(reference, privileged):
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    env = OmniEnv(reference=reference, observation={"privileged": privileged})
+    with warnings.catch_warnings():
+        # It would have actions in [-1, 1]; ours are limits far beyond what a policy does.
+        warnings.filterwarnings("ignore", message=".*symmetric and normalized.*")
+        checker.check_env(env, skip_render_check=True)
