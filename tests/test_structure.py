@@ -29,6 +29,7 @@ ORDER = (
     "training",
     "export",
     "viewer",
+    "generation",
     "benchmarks",
     "demo",
     "publish",

@@ -13,6 +13,7 @@ from omni_envs.cli.curves import Curves
 from omni_envs.cli.demo import Demo
 from omni_envs.cli.evaluate import Evaluate
 from omni_envs.cli.export import Export
+from omni_envs.cli.generate import Generate
 from omni_envs.cli.list import List
 from omni_envs.cli.publish import Publish
 from omni_envs.cli.retarget import Retarget
@@ -24,6 +25,7 @@ Command = (
     Annotated[List, tyro.conf.subcommand("list")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Retarget, tyro.conf.subcommand("retarget")]
+    | Annotated[Generate, tyro.conf.subcommand("generate")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Convert, tyro.conf.subcommand("convert")]
     | Annotated[Skeleton, tyro.conf.subcommand("skeleton")]

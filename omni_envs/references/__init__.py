@@ -4,6 +4,7 @@ from omni_envs.references.build import evaluate_reference, make_reference
 from omni_envs.references.cache import cache_folder, cached_reference
 from omni_envs.references.foreign import open_reference, reference_from_motion
 from omni_envs.references.formats import MOTION_FORMATS, ForeignMotion, load_motion, save_motion
+from omni_envs.references.key import reference_key
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.parallel import make_references
 from omni_envs.references.picture import report_picture
@@ -22,6 +23,7 @@ __all__ = [
     "open_reference",
     "reference_from_motion",
     "reference_from_qpos",
+    "reference_key",
     "report_picture",
     "save_motion",
 ]

@@ -1,0 +1,68 @@
+"""Where items are made: processes of this machine, or a Ray cluster. Both run ``make_item``."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
+
+from omni_envs.errors import MissingDependencyError, OmniEnvsError
+from omni_envs.generation.item import Item, make_item
+from omni_envs.threads import one_maths_thread
+
+Engine = Callable[[Sequence[Item], str, int], Iterator[dict[str, Any]]]
+"""(items, folder of the dataset, workers) → rows as they are finished."""
+
+
+def run_local(items: Sequence[Item], out: str, jobs: int) -> Iterator[dict[str, Any]]:
+    """Makes items in processes of one maths thread each.
+
+    Raises:
+        OmniEnvsError: A process died, e.g. for lack of memory; what was finished stays.
+    """
+    context = multiprocessing.get_context("spawn")
+    with one_maths_thread(), ProcessPoolExecutor(min(jobs, len(items)), context) as pool:
+        futures = [pool.submit(make_item, item, out) for item in items]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BrokenProcessPool as error:
+            raise OmniEnvsError(
+                "A process that made references died (killed, or out of memory). What it had "
+                "finished is kept: run the same command again to go on, with fewer --jobs."
+            ) from error
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def run_ray(items: Sequence[Item], out: str, jobs: int) -> Iterator[dict[str, Any]]:
+    """Makes items on the Ray cluster of this machine's address, or one of its own.
+
+    The dataset's folder and the sources must be at the same place on every machine.
+
+    Raises:
+        MissingDependencyError: Ray is not installed.
+    """
+    try:
+        import ray
+    except ImportError as error:
+        raise MissingDependencyError("ray", "ray", "The engine 'ray'") from error
+    mine = not ray.is_initialized()
+    if mine:
+        ray.init(num_cpus=jobs, log_to_driver=False, include_dashboard=False)
+    try:
+        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        task = ray.remote(num_cpus=1, runtime_env={"env_vars": threads})(make_item)
+        pending = [task.remote(item, out) for item in items]
+        while pending:
+            ready, pending = ray.wait(pending, num_returns=1)
+            yield from ray.get(ready)
+    finally:
+        if mine:
+            ray.shutdown()
+
+
+ENGINES: dict[str, Engine] = {"local": run_local, "ray": run_ray}
+"""Name to engine."""
