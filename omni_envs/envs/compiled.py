@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from omni_envs.envs.batches import Observation
+from omni_envs.envs.episodes import Episodes
+from omni_envs.envs.simulation import Simulation
 from omni_envs.envs.task import TrackingTask
 from omni_envs.tracking import kernels
-from omni_envs.tracking.alignment import Bodies
 from omni_envs.tracking.motion import MotionLibrary
 from omni_envs.tracking.randomization import start_widths, symmetric
 
@@ -21,14 +23,23 @@ class Judged(NamedTuple):
     Attributes:
         reward: (N,) sum of the terms.
         terminated: (N,) whether any flag is set.
+        truncated: (N,) whether the episode is over for lack of motion or time alone.
+        done: (N,) either.
         figures: (F, N) terms of the reward, then tracking errors: m, rad, m/s, rad/s.
-        flags: (5, N) the tests in the order of ``TESTS``, then whether the simulation diverged.
+        flags: (8, N) the tests in the order of ``TESTS``, whether the simulation diverged, and the
+            three above.
+        some_done: Whether any episode is over.
+        push_due: Whether any simulation is to be pushed.
     """
 
     reward: np.ndarray
     terminated: np.ndarray
+    truncated: np.ndarray
+    done: np.ndarray
     figures: np.ndarray
     flags: np.ndarray
+    some_done: bool
+    push_due: bool
 
 
 class CompiledTask:
@@ -43,10 +54,12 @@ class CompiledTask:
     Args:
         task: The task, names resolved.
         library: The motions.
+        num: N.
         samples: Physics steps that a contact sensor remembers.
     """
 
-    def __init__(self, task: TrackingTask, library: MotionLibrary, samples: int) -> None:
+    def __init__(self, task: TrackingTask, library: MotionLibrary, num: int, samples: int) -> None:
+        self._everyone = np.arange(num)
         self.numbers = task.numbers(samples)
         self._table, self._at = library.table, library.at
         self.figures = (*(f"reward/{n}" for n in task.terms), *(f"error/{n}" for n in task.errors))
@@ -66,96 +79,84 @@ class CompiledTask:
         self._nothing = np.empty((0, 0))
         self._silence = np.empty((0, 0), np.float32)
 
-    def judge(
+    def settle(
         self,
-        rows: np.ndarray,
-        qpos: np.ndarray,
-        bodies: Bodies,
+        simulation: Simulation,
+        episodes: Episodes,
         action: np.ndarray,
-        previous_action: np.ndarray,
-        history: np.ndarray,
-        object_active: bool,
         diverged: np.ndarray,
+        object_active: bool,
+        rng: np.random.Generator,
+        out: Observation,
     ) -> Judged:
-        """Compares the states after a control step with the frames that the policy saw.
+        """Does what follows a control step of physics.
+
+        Places the bodies, compares the states with the frames that the policy saw, moves on to the
+        next frames and observes.
 
         Args:
-            rows: (N,) frames as rows of the library's table.
-            qpos: (N, nq).
-            bodies: The robot's tracked bodies.
+            simulation: The states.
+            episodes: Where the episodes are; they move on.
             action: (N, n).
-            previous_action: (N, n).
-            history: (N, nhistory) of the contact sensors.
-            object_active: Whether losing the object ends an episode.
             diverged: (N,) simulations that get no reward.
+            object_active: Whether losing the object ends an episode.
+            rng: Source of the observation's noise.
+            out: Observations of N simulations, to write to.
         """
-        num = len(rows)
-        judged = Judged(
-            np.empty(num),
-            np.empty(num, bool),
-            np.empty((len(self.figures), num)),
-            np.empty((len(TESTS) + 1, num), bool),
-        )
-        kernels.judge(
+        num = simulation.num
+        flags = np.empty((len(TESTS) + 4, num), bool)
+        figures, reward = np.empty((len(self.figures), num)), np.empty(num)
+        terminated, truncated, done = flags[-3:]
+        noise, policy, critic = self._outputs(num, rng, out)
+        some, due = kernels.settle(
             self.numbers,
             self._at,
             self._table,
-            rows,
-            qpos,
-            bodies,
+            simulation.kinematics.tree,
+            episodes.clocks,
+            simulation.qpos,
+            simulation.qvel,
+            episodes.default,
             action,
-            previous_action,
-            history,
+            episodes.action,
+            simulation.history,
             object_active,
             diverged,
-            judged.figures,
-            judged.flags,
-            judged.reward,
-            judged.terminated,
+            noise,
+            self._everyone,
+            simulation.bodies(),
+            figures,
+            flags,
+            reward,
+            terminated,
+            truncated,
+            done,
+            policy,
+            critic,
         )
-        return judged
+        episodes.action = action
+        return Judged(reward, terminated, truncated, done, figures, flags, some, due)
 
     def observe(
         self,
-        rows: np.ndarray,
-        qpos: np.ndarray,
-        qvel: np.ndarray,
-        bodies: Bodies,
-        default: np.ndarray,
-        action: np.ndarray,
-        rng: np.random.Generator,
+        simulation: Simulation,
+        episodes: Episodes,
         ids: np.ndarray,
-        out: np.ndarray | dict[str, np.ndarray],
+        rng: np.random.Generator,
+        out: Observation,
     ) -> None:
-        """Writes the observations of the simulations ``ids`` (K,) into their rows of ``out``.
-
-        Args:
-            rows: (N,) the frames to track next, as rows of the library's table.
-            qpos: (N, nq).
-            qvel: (N, nv).
-            bodies: The robot's tracked bodies.
-            default: (N, n) default joint positions.
-            action: (N, n) previous action.
-            rng: Source of the noise.
-            ids: (K,) simulations.
-            out: (N, size) float32, or ``{"policy": …, "critic": …}``.
-        """
-        noise = self._silence
-        if self._noisy:
-            noise = rng.random((len(ids), self._noisy), dtype=np.float32)
-        policy, critic = (
-            (out["policy"], out["critic"]) if isinstance(out, dict) else (out, self._silence)
-        )
+        """Writes the observations of the simulations ``ids`` (K,) into their rows of ``out``."""
+        noise, policy, critic = self._outputs(len(ids), rng, out)
         kernels.observe(
             self.numbers,
             self._at,
             self._table,
-            rows,
-            qpos,
-            qvel,
-            bodies,
-            default,
-            action,
+            episodes.rows,
+            simulation.qpos,
+            simulation.qvel,
+            simulation.bodies(),
+            episodes.default,
+            episodes.action,
             noise,
             ids,
             policy,
@@ -185,3 +186,14 @@ class CompiledTask:
         if share is not None and len(draws):
             draws *= share[:, None]
         kernels.start_states(self.numbers, self._at, self._table, rows, draws, ids, qpos, qvel)
+
+    def _outputs(
+        self, count: int, rng: np.random.Generator, out: Observation
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Noise of (count, W) numbers in [0, 1), and where to write."""
+        noise = self._silence
+        if self._noisy:
+            noise = rng.random((count, self._noisy), dtype=np.float32)
+        if isinstance(out, dict):
+            return noise, out["policy"], out["critic"]
+        return noise, out, self._silence

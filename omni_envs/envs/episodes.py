@@ -6,8 +6,12 @@ from collections import deque
 
 import numpy as np
 
+from omni_envs.tracking import kernels
 from omni_envs.tracking.config import NoiseGrowth, TrackingConfig
 from omni_envs.tracking.motion import MotionLibrary
+
+NEVER = 2**62
+"""Control steps until a push that does not come."""
 
 GATE_EPISODES = 100
 """Finished episodes over which body tracking is judged."""
@@ -87,7 +91,7 @@ class Episodes:
         action: (N, n) previous action.
         default: (N, n) default joint positions, randomization included, rad.
         rows: (N,) row of the library's table to track next.
-        next_push: (N,) control steps until the next push.
+        clocks: All of these and the next pushes, in the form that the kernels move on.
 
     Args:
         library: The motions.
@@ -108,12 +112,11 @@ class Episodes:
         self._library, self._nominal, self._config = library, default, config
         self._max_steps = max_steps
         joints = len(default)
-        self.motion, self.frame = np.zeros(num, int), np.zeros(num, int)
-        self.elapsed, self.possible = np.zeros(num, int), np.ones(num, int)
         self.action, self.default = np.zeros((num, joints)), np.tile(default, (num, 1))
-        self.next_push, self.rows = np.zeros(num, int), np.zeros(num, int)
-        # First row and last frame of the motions, per simulation.
-        self._first, self._last = np.zeros(num, int), np.zeros(num, int)
+        self.motion = np.zeros(num, int)
+        self.clocks = kernels.Clocks(*(np.zeros(num, int) for _ in kernels.Clocks._fields))
+        self.rows, self.frame = self.clocks.rows, self.clocks.frame
+        self.elapsed, self.possible = self.clocks.elapsed, self.clocks.possible
 
     def start(
         self, ids: np.ndarray, motion: np.ndarray, frame: np.ndarray, rng: np.random.Generator
@@ -127,46 +130,30 @@ class Episodes:
             rng: Source of chance.
         """
         self.motion[ids], self.frame[ids], self.elapsed[ids] = motion, frame + 1, 0
-        self._first[ids], self._last[ids] = (
+        clocks = self.clocks
+        clocks.first[ids], clocks.last[ids] = (
             self._library.starts[motion],
             self._library.lengths[motion] - 1,
         )
-        left = self._last[ids] - frame
+        left = clocks.last[ids] - frame
         self.possible[ids] = left if self._max_steps is None else np.minimum(left, self._max_steps)
-        self.rows[ids] = self._first[ids] + frame + 1
+        self.rows[ids] = clocks.first[ids] + frame + 1
         self.action[ids] = 0.0
         half = self._config.randomization.joint_default
         spread = (2.0 * rng.random((len(ids), len(self._nominal))) - 1.0) * half
         self.default[ids] = self._nominal + spread
-        self.next_push[ids] = self._interval(len(ids), rng)
-
-    def advance(self, action: np.ndarray) -> np.ndarray:
-        """Counts a control step and moves on to the next frame, the last one staying.
-
-        Returns:
-            (N,) whether the episode is over for lack of motion or time.
-        """
-        self.action = action
-        self.elapsed += 1
-        self.frame += 1
-        np.minimum(self.frame, self._last, out=self.frame)
-        np.add(self._first, self.frame, out=self.rows)
-        return self.elapsed >= self.possible
+        clocks.next_push[ids] = self._interval(len(ids), rng)
 
     def due_pushes(self, rng: np.random.Generator) -> np.ndarray:
-        """Counts down and returns the simulations (K,) to push now."""
-        if self._config.randomization.push is None:
-            return np.empty(0, int)
-        self.next_push -= 1
-        due = (self.next_push <= 0).nonzero()[0]
-        if len(due):
-            self.next_push[due] = self._interval(len(due), rng)
+        """Returns the simulations (K,) to push now, and draws when they are to be pushed next."""
+        due = (self.clocks.next_push <= 0).nonzero()[0]
+        self.clocks.next_push[due] = self._interval(len(due), rng)
         return due
 
     def _interval(self, count: int, rng: np.random.Generator) -> np.ndarray | int:
         push = self._config.randomization.push
         if push is None:
-            return 0
+            return NEVER
         low, high = push.interval
         seconds = low + (high - low) * rng.random(count)
         return np.maximum(np.round(seconds / self._config.physics.control_step), 1).astype(int)

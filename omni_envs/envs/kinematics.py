@@ -18,20 +18,23 @@ from omni_envs.tracking.alignment import Bodies
 class BodyKinematics:
     """Poses and velocities of the tracked bodies of N simulations.
 
+    Attributes:
+        tree: The bodies that tracked bodies hang on.
+
     Args:
         robot: The robot.
         num: N.
     """
 
     def __init__(self, robot: Robot, num: int) -> None:
-        self._tree, self._everyone = body_tree(robot), np.arange(num)
+        self.tree, self._everyone = body_tree(robot), np.arange(num)
         count = len(robot.tracked_bodies)
         self._bodies = Bodies(*(np.zeros((num, count, size)) for size in (3, 4, 3, 3)))
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray, ids: np.ndarray | None = None) -> None:
         """Computes the bodies at (N, nq) and (N, nv) states, of all simulations or of some."""
         ids = self._everyone if ids is None else ids
-        kernels.place_bodies(self._tree, qpos, qvel, ids, self._bodies)
+        kernels.place_bodies(self.tree, qpos, qvel, ids, self._bodies)
 
     def bodies(self, ids: np.ndarray | None = None) -> Bodies:
         """Returns the bodies of the last update: live views of all, or copies of some."""

@@ -38,6 +38,8 @@ class Simulation:
         qpos: (N, nq) live: robot 7 + n, then the object's 7.
         qvel: (N, nv) live; angular parts of free joints in the body frame.
         ctrl: (N, n) live joint targets, rad.
+        kinematics: The tracked bodies; see ``place_bodies``.
+        exploded: Whether any simulation diverged in the last step.
         history: (N, nhistory) live, of the contact sensors; see ``EnvModel.contact_forces``.
 
     Args:
@@ -65,10 +67,10 @@ class Simulation:
         self.qpos, self.qvel = self.batch.bind("qpos"), self.batch.bind("qvel")
         self.ctrl, self._warmstart = self.batch.bind("ctrl"), self.batch.bind("qacc_warmstart")
         self.history = self.batch.bind("history")
-        self._kinematics = BodyKinematics(robot, num)
+        self.kinematics = BodyKinematics(robot, num)
         self._variants, self._fields = variants, variants.attach(self.batch)
         self.variant = np.zeros(num, int)
-        self._diverged = np.zeros(num, bool)
+        self._diverged, self.exploded = np.zeros(num, bool), False
         self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
         self._rows = [
             (_flat(variants.fields[name]), _flat(live)) for name, live in self._fields.items()
@@ -76,7 +78,7 @@ class Simulation:
         self._use_variants(np.arange(num), self.variant)
 
     def step(self) -> np.ndarray:
-        """Advances every simulation by a control step under ``ctrl``.
+        """Advances every simulation by a control step under ``ctrl``; the bodies come later.
 
         Returns:
             (N,) whether the simulation diverged. It is then back in the state before this step.
@@ -86,11 +88,13 @@ class Simulation:
         self.batch.step(nstep=self.substeps)
         # MuJoCo resets a simulation that blew up without a word, and only counts a warning.
         diverged, warnings = np.empty(self.num, bool), self.batch.warning
-        if kernels.exploded(self.qpos, self.qvel, warnings, _BAD_STATE, SPEED_LIMIT, diverged):
+        self.exploded = kernels.exploded(
+            self.qpos, self.qvel, warnings, _BAD_STATE, SPEED_LIMIT, diverged
+        )
+        if self.exploded:
             self.qpos[diverged], self.qvel[diverged] = (a[diverged] for a in self._before[:2])
             self._warmstart[diverged] = 0.0
             self._diverged |= diverged
-        self._kinematics.update(self.qpos, self.qvel)
         return diverged
 
     def reset(self, ids: np.ndarray, variant: np.ndarray) -> None:
@@ -113,11 +117,11 @@ class Simulation:
 
     def place_bodies(self, ids: np.ndarray | None = None) -> None:
         """Computes the tracked bodies anew, of all simulations or of some."""
-        self._kinematics.update(self.qpos, self.qvel, ids)
+        self.kinematics.update(self.qpos, self.qvel, ids)
 
     def bodies(self, ids: np.ndarray | None = None) -> Bodies:
         """Returns the tracked bodies: live views of all simulations, or copies of some."""
-        return self._kinematics.bodies(ids)
+        return self.kinematics.bodies(ids)
 
     def contact_forces(self) -> np.ndarray:
         """Returns the (N, sensors, samples, 3) contact forces of the last control step, N."""

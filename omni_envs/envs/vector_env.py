@@ -182,7 +182,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.simulation = Simulation(
             models[0], self.robot, self._variants, num_envs, config.physics.substeps, num_threads
         )
-        self._task = CompiledTask(plain, self._library, models[0].samples)
+        self._task = CompiledTask(plain, self._library, num_envs, models[0].samples)
         if max_episode_steps is None and config.termination.max_seconds is not None:
             max_episode_steps = max(round(config.termination.max_seconds / dt), 1)
         default = self.robot.default_joint_array
@@ -197,7 +197,6 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._lead = np.empty((0, self.robot.num_joints))
         if targets is not None:
             self._lead = (targets - self.robot.default_joint_array) / self._scale
-        self._everyone = np.arange(num_envs)
         self._started = False
         self.policy_layout, self.critic_layout = plain.policy_layout, plain.critic_layout
         critic = self.critic_layout.size if config.observation.privileged else None
@@ -281,25 +280,22 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             raise InvalidDataError(
                 type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"
             )
-        judged, truncated = self.advance(actions)
+        judged = self.advance(actions)
         infos = batched_infos(self._infos(judged) | self._place())
-        done = judged.terminated | truncated
-        finished = done.nonzero()[0]
-        if len(finished) and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            infos = add_finals(infos, self.observations, done)
-            self._start(finished)
+        if judged.some_done and self.autoreset_mode is AutoresetMode.SAME_STEP:
+            infos = add_finals(infos, self.observations, judged.done)
+            self._start(judged.done.nonzero()[0])
             infos |= self._place()
-        return copied(self.observations), judged.reward, judged.terminated, truncated, infos
+        observations = copied(self.observations)
+        return observations, judged.reward, judged.terminated, judged.truncated, infos
 
-    def advance(self, actions: np.ndarray) -> tuple[Judged, np.ndarray]:
+    def advance(self, actions: np.ndarray) -> Judged:
         """Advances all simulations by a control step, and starts none anew.
+
+        What comes next is in ``observations``.
 
         Args:
             actions: (N, n) float64, contiguous.
-
-        Returns:
-            What the step was worth, and (N,) which episodes are over without being terminated.
-            What comes next is in ``observations``.
         """
         if not self._started:
             raise InvalidOptionError("step: call reset first.")
@@ -307,7 +303,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         # From here on an action is the standard one of the same joint target: rewards and the
         # observed previous action then mean the same in all modes, and for an exported policy.
         action, bad = np.empty_like(actions), np.empty(self.num_envs, bool)
-        kernels.joint_targets(
+        some_bad = kernels.joint_targets(
             actions,
             self.config.action.limit,
             self._lead,
@@ -319,32 +315,30 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             bad,
         )
         diverged = simulation.step()
-        diverged |= bad
-        judged = self._task.judge(
-            episodes.rows,
-            simulation.qpos,
-            simulation.bodies(),
-            action,
-            episodes.action,
-            simulation.history,
-            self._gate.open,
-            diverged,
-        )
-        if diverged.any():
+        if some_bad or simulation.exploded:
+            diverged |= bad
             self._record_divergence(diverged.nonzero()[0])
-        failed = judged.terminated.nonzero()[0]
-        self.sampler.record(episodes.motion[failed], episodes.frame[failed])
-        truncated = episodes.advance(action)
-        done = truncated | judged.terminated
-        truncated &= ~judged.terminated
-        finished = done.nonzero()[0]
-        if len(finished):
+        frame = episodes.frame.copy() if self.sampler.adapts else episodes.frame
+        judged = self._task.settle(
+            simulation,
+            episodes,
+            action,
+            diverged,
+            self._gate.open,
+            self.np_random,
+            self.observations,
+        )
+        if self.sampler.adapts:
+            failed = judged.terminated.nonzero()[0]
+            self.sampler.record(episodes.motion[failed], frame[failed])
+        if judged.some_done:
+            finished = judged.done.nonzero()[0]
             lasted = episodes.elapsed[finished], episodes.possible[finished]
             self._gate.record(*lasted)
             self._noise.record(*lasted)
-        self._push(done)
-        self._observe(self._everyone)
-        return judged, truncated
+        if judged.push_due:
+            self._push(judged.done)
+        return judged
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Returns one (height, width, 3) uint8 picture per simulation, the reference as a ghost."""
@@ -387,27 +381,16 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._observe(ids)
 
     def _push(self, done: np.ndarray) -> None:
-        due = self._episodes.due_pushes(self.np_random)
-        config = self.config.randomization.push
+        due, config = self._episodes.due_pushes(self.np_random), self.config.randomization.push
+        due = due[~done[due]]
         if len(due) and config is not None:
-            due = due[~done[due]]
             self.simulation.qvel[due, :6] += push(
                 self.simulation.qpos[due, 3:7], config, self.np_random
             )
+            self._observe(due)
 
     def _observe(self, ids: np.ndarray) -> None:
-        simulation, episodes = self.simulation, self._episodes
-        self._task.observe(
-            episodes.rows,
-            simulation.qpos,
-            simulation.qvel,
-            simulation.bodies(),
-            episodes.default,
-            episodes.action,
-            self.np_random,
-            ids,
-            self.observations,
-        )
+        self._task.observe(self.simulation, self._episodes, ids, self.np_random, self.observations)
 
     def _infos(self, judged: Judged) -> dict[str, np.ndarray]:
         values = dict(zip(self._task.figures, judged.figures, strict=True))
@@ -423,11 +406,12 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Returns the infos of the first simulation as plain numbers, of a step or of a start."""
         info: dict[str, Any] = {}
         if judged is not None:
-            info = dict(zip(self._task.figures, judged.figures[:, 0].tolist(), strict=True))
+            task = self._task
+            info.update(zip(task.figures, judged.figures[:, 0].tolist(), strict=True))
             flags = judged.flags[:, 0].tolist()
-            for name, k in zip(self._task.flags, self._task.flag_rows, strict=True):
-                info[name] = flags[k]
-        info["motion"], info["frame"] = int(self._episodes.motion[0]), int(self._episodes.frame[0])
+            info.update(zip(task.flags, [flags[k] for k in task.flag_rows], strict=True))
+        episodes = self._episodes
+        info["motion"], info["frame"] = episodes.motion[0].item(), episodes.frame[0].item()
         return info
 
     def _record_divergence(self, ids: np.ndarray) -> None:

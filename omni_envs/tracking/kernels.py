@@ -98,6 +98,28 @@ class Numbers(NamedTuple):
     noise_width: Array
 
 
+class Clocks(NamedTuple):
+    """Where N episodes are; see ``Episodes``.
+
+    Attributes:
+        rows: (N,) row of the table to track next: first + frame.
+        frame: (N,) frame of the motion.
+        first: (N,) first row of the motion.
+        last: (N,) last frame of the motion.
+        elapsed: (N,) control steps since the start.
+        possible: (N,) control steps until motion or time is over.
+        next_push: (N,) control steps until the next push.
+    """
+
+    rows: Array
+    frame: Array
+    first: Array
+    last: Array
+    elapsed: Array
+    possible: Array
+    next_push: Array
+
+
 @_compiled
 def _product(a: Tuple, b: Tuple) -> Tuple:
     return (
@@ -182,12 +204,13 @@ def _gravity_z(q: Tuple) -> float:
 def joint_targets(
     actions: Array, limit: float, lead: Array, rows: Array, default: Array, scale: Array,
     out_action: Array, out_target: Array, out_bad: Array,
-) -> None:  # fmt: skip
+) -> bool:  # fmt: skip
     """Turns (N, n) actions into standard actions and joint targets.
 
     ``lead`` is (T, n), what is added to an action for the row of the table, or (0, n). An action
-    with a NaN or infinite entry is bad, and taken as zero.
+    with a NaN or infinite entry is bad, and taken as zero. Returns whether any is.
     """
+    some = False
     num, n = actions.shape
     for i in range(num):
         bad = False
@@ -195,12 +218,14 @@ def joint_targets(
             if not np.isfinite(actions[i, j]):
                 bad = True
         out_bad[i] = bad
+        some |= bad
         for j in range(n):
             action = 0.0 if bad else min(max(actions[i, j], -limit), limit)
             if len(lead):
                 action += lead[rows[i], j]
             out_action[i, j] = action
             out_target[i, j] = default[i, j] + scale[j] * action
+    return some
 
 
 @_compiled
@@ -468,6 +493,51 @@ def observe(
             k = _write(out, k, _rotate_inverse(m, (x[0] - p[0], x[1] - p[1], x[2] - p[2])))
             k = _write_rot6d(out, k, _matrix(_product(back, _quadruple(x, 3))))
             k = _write(out, k, _rotate_inverse(m, _triple(qvel[i], numbers.root_nv)))
+
+
+@_compiled
+def advance(
+    clocks: Clocks, terminated: Array, out_truncated: Array, out_done: Array
+) -> tuple[bool, bool]:
+    """Counts a control step and moves on to the next frames, the last ones staying.
+
+    Writes (N,) which episodes are over for lack of motion or time alone, and which are over.
+    Returns whether any is, and whether any push is due.
+    """
+    some, due = False, False
+    for i in range(len(clocks.rows)):
+        clocks.elapsed[i] += 1
+        clocks.next_push[i] -= 1
+        clocks.frame[i] = min(clocks.frame[i] + 1, clocks.last[i])
+        clocks.rows[i] = clocks.first[i] + clocks.frame[i]
+        over = clocks.elapsed[i] >= clocks.possible[i]
+        out_truncated[i] = over and not terminated[i]
+        out_done[i] = over or terminated[i]
+        some |= out_done[i]
+        due |= clocks.next_push[i] <= 0
+    return some, due
+
+
+@_compiled
+def settle(
+    numbers: Numbers, at: Columns, table: Array, tree: Tree, clocks: Clocks, qpos: Array,
+    qvel: Array, default: Array, action: Array, previous: Array, history: Array,
+    object_active: bool, diverged: Array, noise: Array, everyone: Array, out_bodies: Bodies,
+    out_figures: Array, out_flags: Array, out_reward: Array, out_terminated: Array,
+    out_truncated: Array, out_done: Array, out_policy: Array, out_critic: Array,
+) -> tuple[bool, bool]:  # fmt: skip
+    """All that follows a control step of physics, in one call: returns what ``advance`` does."""
+    place_bodies(tree, qpos, qvel, everyone, out_bodies)
+    judge(
+        numbers, at, table, clocks.rows, qpos, out_bodies, action, previous, history,
+        object_active, diverged, out_figures, out_flags, out_reward, out_terminated,
+    )  # fmt: skip
+    some, due = advance(clocks, out_terminated, out_truncated, out_done)
+    observe(
+        numbers, at, table, clocks.rows, qpos, qvel, out_bodies, default, action, noise, everyone,
+        out_policy, out_critic,
+    )  # fmt: skip
+    return some, due
 
 
 @_compiled

@@ -49,6 +49,11 @@ class MotionSampler:
         self._cumulative: np.ndarray | None = None
 
     @property
+    def adapts(self) -> bool:
+        """Whether failures count."""
+        return self.config.start == "adaptive"
+
+    @property
     def num_bins(self) -> int:
         """Bins of all motions together."""
         return len(self.bin_motion)
@@ -60,7 +65,7 @@ class MotionSampler:
             motion: (K,) motions of the episodes that were terminated in this step.
             frame: (K,) frames within the motions where that happened.
         """
-        if self.config.start != "adaptive":
+        if not self.adapts:
             return
         self.failures *= self.config.adaptive.decay
         self._cumulative = None

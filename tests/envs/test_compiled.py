@@ -1,5 +1,7 @@
 """The compiled loops are held to the plain functions on arrays."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from omni_envs.envs.compiled import CompiledTask
 from omni_envs.envs.model import EnvModel, build_model
 from omni_envs.envs.task import TrackingTask
 from omni_envs.robots import G1
-from omni_envs.tracking import observations
+from omni_envs.tracking import kernels, observations
 from omni_envs.tracking.alignment import Bodies
 from omni_envs.tracking.config import make_config
 from omni_envs.tracking.motion import MotionLibrary
@@ -48,14 +50,36 @@ def case(request, sway):
     for quaternions in (qpos[:, 3:7], bodies[1], qpos[:, 39:43]):
         quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
     action = rng.normal(size=(2, num, 29))
-    state = SimpleState(rows, frames, qpos, qvel, Bodies(*bodies), action[0], action[1])
-    return plain, CompiledTask(plain, library, model.samples), state, model, rng
+    state = SimpleNamespace(
+        library=library,
+        rows=rows,
+        frames=frames,
+        qpos=qpos,
+        qvel=qvel,
+        bodies=Bodies(*bodies),
+        action=action[0],
+        previous=action[1],
+    )
+    return plain, CompiledTask(plain, library, num, model.samples), state, model, rng
 
 
-class SimpleState:
-    def __init__(self, rows, frames, qpos, qvel, bodies, action, previous):
-        self.rows, self.frames, self.qpos, self.qvel = rows, frames, qpos, qvel
-        self.bodies, self.action, self.previous = bodies, action, previous
+def judge(compiled, s, history, object_active, diverged):
+    """(reward, terminated, figures, flags) of states whose bodies need not hang together."""
+    num = len(s.rows)
+    figures, flags = np.empty((len(compiled.figures), num)), np.empty((5, num), bool)
+    reward, terminated = np.empty(num), np.empty(num, bool)
+    kernels.judge(
+        compiled.numbers, s.library.at, s.library.table, s.rows, s.qpos, s.bodies, s.action,
+        s.previous, history, object_active, diverged, figures, flags, reward, terminated,
+    )  # fmt: skip
+    return SimpleNamespace(reward=reward, terminated=terminated, figures=figures, flags=flags)
+
+
+def observe(compiled, s, default, noise, ids, policy, critic):
+    kernels.observe(
+        compiled.numbers, s.library.at, s.library.table, s.rows, s.qpos, s.qvel, s.bodies, default,
+        s.action, noise, ids, policy, critic,
+    )  # fmt: skip
 
 
 def sensor_history(model: EnvModel, num: int, rng) -> np.ndarray:
@@ -69,9 +93,7 @@ def test_judgements_agree(case, object_active):
     forces = model.contact_forces(history)
     expected = plain.judge(s.qpos, s.bodies, s.frames, s.action, s.previous, forces, object_active)
     diverged = np.zeros(len(s.rows), bool)
-    found = compiled.judge(
-        s.rows, s.qpos, s.bodies, s.action, s.previous, history, object_active, diverged
-    )
+    found = judge(compiled, s, history, object_active, diverged)
     np.testing.assert_allclose(found.reward, expected.reward, atol=1e-12)
     figures = {f"reward/{k}": v for k, v in expected.terms.items()}
     figures |= {f"error/{k}": v for k, v in expected.errors.items()}
@@ -93,8 +115,9 @@ def test_diverged_simulations_earn_nothing_and_are_terminated(case):
     _, compiled, s, model, rng = case
     history = sensor_history(model, len(s.rows), rng)
     diverged = np.arange(len(s.rows)) % 2 == 1
-    states = (s.rows, s.qpos, s.bodies, s.action, s.previous, history, False)
-    found, well = (compiled.judge(*states, d) for d in (diverged, np.zeros_like(diverged)))
+    found, well = (
+        judge(compiled, s, history, False, d) for d in (diverged, np.zeros_like(diverged))
+    )
     terms = [k for k, name in enumerate(compiled.figures) if name.startswith("reward/")]
     assert found.terminated[diverged].all() and not found.reward[diverged].any()
     assert not found.figures[terms][:, diverged].any()
@@ -108,16 +131,17 @@ def test_observations_agree(case):
     expected = plain.observe(
         s.qpos, s.qvel, s.bodies, s.frames, default, s.action, np.random.default_rng(5)
     )
+    width = len(compiled.numbers.noise_width)
+    noise = np.random.default_rng(5).random((40, width), dtype=np.float32)
     ids = np.array([3, 7, 39])
     for some in (np.arange(40), ids):
-        out = {k: np.zeros((40, len(v[0])), np.float32) for k, v in named(expected).items()}
-        whole = out if isinstance(expected, dict) else out["policy"]
-        rng = np.random.default_rng(5)
-        if len(some) < 40 and plain.config.observation.noise is not None:
-            continue  # other draws
-        compiled.observe(s.rows, s.qpos, s.qvel, s.bodies, default, s.action, rng, some, whole)
+        out = {k: np.full(v.shape, np.nan, np.float32) for k, v in named(expected).items()}
+        critic = out.get("critic", np.empty((0, 0), np.float32))
+        drawn = noise[some] if width else noise[:0]
+        observe(compiled, s, default, drawn, some, out["policy"], critic)
         for name, values in named(expected).items():
             np.testing.assert_allclose(out[name][some], values[some], atol=2e-6, err_msg=name)
+            assert np.isnan(np.delete(out[name], some, axis=0)).all()
 
 
 def named(values):
@@ -125,13 +149,11 @@ def named(values):
 
 
 def test_observations_agree_in_double_precision(case):
-    plain, compiled, s, _, rng = case
-    if compiled._noisy:
-        compiled._noisy = 0
+    plain, compiled, s, _, _ = case
     default = 0.01 * s.previous
     policy, critic = (np.zeros((40, n.size)) for n in (plain.policy_layout, plain.critic_layout))
-    out = {"policy": policy, "critic": critic}
-    compiled.observe(s.rows, s.qpos, s.qvel, s.bodies, default, s.action, rng, np.arange(40), out)
+    silence = np.empty((0, 0), np.float32)
+    observe(compiled, s, default, silence, np.arange(40), policy, critic)
     a, frames, has_object = plain.anchor, s.frames, s.frames.object_pose is not None
     state = observations.ObservedState(
         frames.qpos[:, 7:],

@@ -253,7 +253,7 @@ def test_pushes_add_to_the_velocity_of_the_root(make, quiet):
     pushed, calm = make(2, **options), make(2, **quiet)
     for env in (pushed, calm):
         env.reset(seed=0, options={"frame": 3})
-    pushed._episodes.next_push[:] = [1, 99]
+    pushed._episodes.clocks.next_push[:] = [1, 99]
     action = np.zeros((2, 29))
     pushed.step(action), calm.step(action)
     change = pushed.simulation.qvel - calm.simulation.qvel
