@@ -142,8 +142,8 @@ G1 = Robot(
         *(f"{s}_ankle_roll_link" for s in SIDES),
         *(f"{s}_wrist_yaw_link" for s in SIDES),
     ),
-    # OmniRetarget's, narrower than the mechanics: the torso stays upright. Its wrists are as good as
-    # locked, too, which lets no palm lie on what it touches: contact points are off by a quarter
+    # OmniRetarget's, narrower than the mechanics: the torso stays upright. Its wrists are as good
+    # as locked, too, which lets no palm lie on what it touches: contact points are off by a quarter
     # more, and climbs cost a fifth more deformation energy. Ours bend where that is of use.
     reference_ranges={
         "waist_roll_joint": (-0.3, 0.3),
