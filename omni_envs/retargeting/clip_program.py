@@ -23,6 +23,7 @@ from omni_envs.retargeting.kinematics import Kinematics, Points
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, Rows
 from omni_envs.retargeting.nominal_task import nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
+from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.qp import step_rows
 from omni_envs.retargeting.stance_plan import stance_tiers
 from omni_envs.retargeting.tasks import Quadratic
@@ -94,6 +95,11 @@ class ClipProgram:
             self._posture_weight[6 + robot.joint_names.index(joint)] = weight
         self._touching = options.contact_weight > 0
         self._touch = ContactTask(source, self.configuration, options.contact_weight)
+        self._orientation: OrientationTask | None = None
+        if options.orientation_weights:
+            self._orientation = OrientationTask(
+                source.keypoints, self.configuration, options.orientation_weights
+            )
         metric = self.configuration.metric
         self._velocity_weight = options.smoothness_weight * metric
         self._nominal, self._nominal_weight = nominal, np.zeros((len(qpos), robot.nv))
@@ -148,16 +154,19 @@ class ClipProgram:
         """
         radius = np.broadcast_to(radius, stop - start)
         contacts: list[Rows] = []
-        touches: list[Quadratic | None] = []
+        costs: list[tuple[int, Quadratic | None]] = []
 
         def visit(t: int) -> None:
             contacts.append(step_rows(self.configuration, [self.contact]))
             self._touch.set_frame(t if self._touching else None)
-            touches.append(self._touch.quadratic(self.configuration))
+            costs.append((t - start, self._touch.quadratic(self.configuration)))
+            if self._orientation is not None:
+                self._orientation.set_frame(t)
+                costs.append((t - start, self._orientation.quadratic(self.configuration)))
 
         trace = self._trace(qpos, start, stop, visit)
         H, g = self._objective(trace, start)
-        for i, model in enumerate(touches):
+        for i, model in costs:
             if model is not None:
                 H[i] += model.H
                 g[i] += model.g

@@ -5,6 +5,7 @@ On every frame t (OmniRetarget, arXiv 2509.26633, eq. 3-4):
     minimise   w ‖L(p(q)) - δ_t‖²                 ``interaction_mesh``, ``interaction_mesh_task``
                + ‖q ⊖ q_{t-1}‖²_Q  + posture      ``proximal_task``
                + ‖q ⊖ q_nominal‖²_N              ``nominal_task``, where there is one
+               + orientations of links           ``orientation_task``, where asked for
     subject to φ_j(q) ≥ 0                         ``contact_limit``: surroundings and self
                q_min ≤ q ≤ q_max                  ``joint_limits``
                |q - q_{t-1}| ≤ v_max Δt           ``joint_limits``
@@ -34,6 +35,7 @@ from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import RowLimit
 from omni_envs.retargeting.nominal_task import NominalTask, check_nominal, nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
+from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
@@ -196,6 +198,12 @@ class _Retargeter:
         tasks: list[CostTask] = [self.mesh, self.smoothness, self.posture]
         if options.contact_weight > 0 and source.contact_points:
             tasks.append(self.touch)
+        self.orientation: OrientationTask | None = None
+        if options.orientation_weights:
+            self.orientation = OrientationTask(
+                source.keypoints, self.configuration, options.orientation_weights
+            )
+            tasks.append(self.orientation)
         self.nominal: NominalTask | None = None
         if nominal is not None:
             weights = nominal_weights(self.configuration, options, source.num_frames, source.fps)
@@ -275,6 +283,8 @@ class _Retargeter:
     def _place(self, t: int) -> None:
         """Sets the scene, the mesh and the nominal pose to frame t."""
         self.mesh.set_frame(t)
+        if self.orientation is not None:
+            self.orientation.set_frame(t)
         if self.nominal is not None:
             self.nominal.set_frame(t)
         if self.source.object_poses is not None:

@@ -16,7 +16,7 @@ from omni_envs.demonstrations import (
 from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.metrics import evaluate
 from omni_envs.retargeting.comparators import GMR_MATCHES, gmr_retarget
-from omni_envs.retargeting.comparators.human_frames import HUMAN_BODIES
+from omni_envs.retargeting.human_frames import HUMAN_BODIES
 from omni_envs.robots import G1
 
 SHARED = Path(os.environ.get("OMNI_ENVS_SHARED", Path(__file__).parents[3] / "shared"))

@@ -11,6 +11,7 @@ from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.nominal_task import NominalTask, nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
+from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.stance_plan import StancePlan
 from omni_envs.robots import G1
@@ -57,16 +58,21 @@ def tasks(grasp, configuration):
     weights = nominal_weights(configuration, RetargetOptions(), 60, 30.0)
     nominal = NominalTask(np.tile(G1.default_qpos, (60, 1)), weights)
     nominal.set_frame(4)
+    orientation = OrientationTask(grasp.keypoints, configuration, {"torso": 2.0, "hand": 3.0})
+    orientation.set_frame(50)
     return {
         "mesh": mesh,
         "proximal": near,
         "contact": touch,
         "foothold": foothold_task(),
         "nominal": nominal,
+        "orientation": orientation,
     }
 
 
-@pytest.mark.parametrize("name", ["mesh", "proximal", "contact", "foothold", "nominal"])
+@pytest.mark.parametrize(
+    "name", ["mesh", "proximal", "contact", "foothold", "nominal", "orientation"]
+)
 def test_model(grasp, configuration, q, name):
     task = tasks(grasp, configuration)[name]
     configuration.update(q)

@@ -23,7 +23,7 @@ from omni_envs.demonstrations import Demonstration, scale_demonstration
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.progress import ProgressCallback
-from omni_envs.retargeting.comparators.human_frames import HUMAN_BODIES, human_frames
+from omni_envs.retargeting.human_frames import HUMAN_BODIES, human_frames
 from omni_envs.robots import Robot
 
 Scale = Literal["ratio", "table"]

@@ -4,7 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from omni_envs import rotations
 from omni_envs.demonstrations import MOCAP, SMPLH, Demonstration
-from omni_envs.retargeting.comparators.human_frames import (
+from omni_envs.retargeting.human_frames import (
     HUMAN_BODIES,
     estimate_frames,
     human_frames,
