@@ -92,7 +92,7 @@ class RetargetOptions:
     surface_points: int = 100
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
-    contact_weight: float = 200.0
+    contact_weight: float = 400.0
     nominal_weight: float = 5.0
     nominal_decay: float | None = 1.0 / 3.0
     orientation_weights: Mapping[str, float] = field(default_factory=dict)
