@@ -9,6 +9,8 @@ from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, RowLimit, Rows
 
+_KINDS = np.array([CONTACT, SELF])
+
 
 class ContactLimit(RowLimit):
     """φ_j(q) ≥ -tolerance, linearised: n·(J₂ - J₁) dq ≥ -φ - tolerance (OmniRetarget eq. 4b).
@@ -34,4 +36,4 @@ class ContactLimit(RowLimit):
             contact.geom, model.geom_bodyid, contact.dist, configuration.ancestors, self._tolerance
         )
         A = configuration.contact_rows(bodies, contact.pos, contact.frame[:, :3])
-        return Rows(A, lower, np.full(len(lower), np.inf), np.where(own, SELF, CONTACT))
+        return Rows(A, lower, np.full(len(lower), np.inf), _KINDS[own])

@@ -156,15 +156,17 @@ def contact_sides(
         tolerance: Accepted depth of what is not between two bodies of the robot.
 
     Returns:
-        (N, 2) bodies, (N,) whether both belong to the robot, (N,) lower.
+        (N, 2) bodies, (N,) whether both belong to the robot as 1 or 0, (N,) lower.
     """
     count = len(distances)
-    bodies, own, lower = np.empty((count, 2), np.int64), np.empty(count, np.bool_), np.empty(count)
+    bodies, own, lower = np.empty((count, 2), np.int64), np.zeros(count, np.int64), np.empty(count)
     for i in range(count):
         first, second = geom_bodies[geoms[i, 0]], geom_bodies[geoms[i, 1]]
         bodies[i, 0], bodies[i, 1] = first, second
-        own[i] = moves[first, 0] != 0.0 and moves[second, 0] != 0.0
-        lower[i] = -distances[i] if own[i] else -distances[i] - tolerance
+        if moves[first, 0] != 0.0 and moves[second, 0] != 0.0:
+            own[i], lower[i] = 1, -distances[i]
+        else:
+            lower[i] = -distances[i] - tolerance
     return bodies, own, lower
 
 
