@@ -33,6 +33,7 @@ from omni_envs.robots import KEYPOINTS, Robot, get_robot
 # influence of a frame has faded there.
 _WINDOW, _CONTEXT = 320, 24
 _RELAXED = 2e-4
+_EARLY = 10.0  # rounds before the last are solved to this many times the tolerance
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class RefineOptions:
         acceleration_weight: Weight of the squared acceleration (metric S, SI units) against the
             weighted deformation energy, on every frame.
         radii: Half width of the box about the motion, one per round, m and rad.
-        tolerance: Complementarity gap to solve the program of a round to.
+        tolerance: Complementarity gap to solve the program of the last round to.
     """
 
     acceleration_weight: float = 5e-6
@@ -94,11 +95,11 @@ def refine(
     )
     total = frames * (len(options.radii) + 1)
     for number, radius in enumerate(options.radii):
+        last = number == len(options.radii) - 1
+        tolerance = options.tolerance if last else _EARLY * options.tolerance
         x = np.zeros((frames, robot.nv))
         for start, stop, keep in _windows(frames):
-            solution = solve_clip_qp(
-                program.linearise(qpos, start, stop, radius), options.tolerance
-            )
+            solution = solve_clip_qp(program.linearise(qpos, start, stop, radius), tolerance)
             x[keep] = solution.x[keep.start - start : keep.stop - start]
             if progress is not None:
                 progress(number * frames + keep.stop, total)
