@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,13 @@ def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Returns infos that every simulation has: each key with a mask ``_key`` of who has it."""
     infos: dict[str, Any] = dict(values)
     everyone = np.ones(len(next(iter(values.values()))), bool)
-    infos.update(dict.fromkeys([f"_{key}" for key in values], everyone))
+    infos.update(dict.fromkeys(map(_mask_name, values), everyone))
     return infos
+
+
+@cache
+def _mask_name(key: str) -> str:
+    return f"_{key}"
 
 
 def add_finals(
