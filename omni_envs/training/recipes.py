@@ -83,12 +83,15 @@ _QUICK = PPOConfig(
 # is randomized only a disturbed start still fells the robot at once, so that grows with its skill.
 _FEEDFORWARD = {"action": {"mode": "feedforward"}}
 _GROWING = {**PRIVILEGED, "reset": {"growth": {"share": 0.4, "step": 0.02}}}
+# λ of 0.6: the gradients of two rollouts of this size hardly agree (cosine 0.03 at λ 0.95, 0.23
+# here), and this one is the closer to the true one: twice the cosine with that of another rollout.
 _SMALL = PPOConfig(
     rollout_steps=24,
     learning_rate=3e-4,
     critic_learning_rate=1e-3,
     desired_kl=0.02,
     adapt_every="update",
+    gae_lambda=0.6,
     value_clip=0.0,
     entropy_weight=0.002,
     hidden=(256, 128),
