@@ -51,16 +51,21 @@ class ContactTask(CostTask):
         self._ramp = np.repeat([self._ramps[i, t] for i in touching], 3)
 
     def quadratic(self, configuration: Kinematics) -> Quadratic | None:
-        """Returns the Gauss-Newton model; the nearest points are fixed to the links."""
+        """Returns the model of second order in the motion of the nearest points.
+
+        The gap s u of length s has the curvature uuᵀ + (s/ℓ)(C - uuᵀ), with ℓ its length up to the
+        core of the link and C the directions along which the nearest point does not slide.
+        """
         if not self._active:
             return None
         nearest = [link.nearest(configuration, place) for link, place in self._active]
-        bodies = np.array([body for body, _, _ in nearest])
-        gaps = np.array([gap for _, _, gap in nearest])
+        bodies = np.array([body for body, *_ in nearest])
+        gaps = np.array([gap for *_, gap, _ in nearest])
+        roots = np.array([root for *_, root in nearest])
         jacobian = configuration.body_jacobians(
-            bodies, np.array([point for _, point, _ in nearest])
+            bodies, np.array([point for _, point, *_ in nearest])
         )
-        J = np.moveaxis(jacobian, 0, 1).reshape(gaps.size, -1)
+        J = (roots @ np.moveaxis(jacobian, 0, 1)).reshape(gaps.size, -1)
         return Quadratic(*kernels.weighted_squares(J, -gaps.ravel(), self._weight * self._ramp))
 
 
@@ -103,16 +108,21 @@ class _Link:
 
     def nearest(
         self, configuration: Kinematics, place: np.ndarray
-    ) -> tuple[int, np.ndarray, np.ndarray]:
-        """Body and point of the link nearest to a place, and the gap from there, 0 inside."""
+    ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+        """Body and point of the link nearest to a place, gap from there, 0 inside, and a root R.
+
+        RᵀR is the curvature of ½‖gap‖², and R gap = gap.
+        """
         data = configuration.data
-        nearest, away, length = kernels.nearest_box(
+        nearest, away, length, beyond = kernels.nearest_box(
             data.geom_xpos, data.geom_xmat, self._geoms, self._half, self._radius, place
         )
         # Within the dead zone the place counts as touched.
         reach = self._radius[nearest] + _NEAR
-        gap = away * max(0.0, 1.0 - reach / max(length, 1e-12))
-        return int(self._bodies[nearest]), place - gap, gap
+        part = max(0.0, 1.0 - reach / max(length, 1e-12))
+        gap, along = away * part, np.outer(away, away) / max(length, 1e-12) ** 2
+        root = along + np.sqrt(part) * (beyond - along)
+        return int(self._bodies[nearest]), place - gap, gap, root
 
 
 def _core(model: mujoco.MjModel, geom: int) -> tuple[np.ndarray, float]:

@@ -173,7 +173,7 @@ def contact_sides(
 @_compiled
 def nearest_box(
     xpos: Array, xmat: Array, geoms: Array, half: Array, radius: Array, place: Array
-) -> tuple[int, Array, float]:
+) -> tuple[int, Array, float, Array]:
     """The box, grown by a radius, that is nearest to a place.
 
     Args:
@@ -185,11 +185,12 @@ def nearest_box(
         place: (3,).
 
     Returns:
-        Its index in ``geoms``, the (3,) way from the box that is not grown to the place, and its
-        length.
+        Its index in ``geoms``, the (3,) way from the box that is not grown to the place, its
+        length, and the (3, 3) projector onto the axes on which the place is beyond the box: along
+        the others the nearest point slides as the box moves.
     """
     best, least, length = 0, np.inf, 0.0
-    local, away = np.empty(3), np.zeros(3)
+    local, away, beyond = np.empty(3), np.zeros(3), np.zeros((3, 3))
     for i in range(len(geoms)):
         R, centre = xmat[geoms[i]], xpos[geoms[i]]
         square = 0.0
@@ -204,7 +205,12 @@ def nearest_box(
             best, least, length = i, distance - radius[i], distance
             for k in range(3):
                 away[k] = R[3 * k] * local[0] + R[3 * k + 1] * local[1] + R[3 * k + 2] * local[2]
-    return best, away, length
+                for m in range(3):
+                    beyond[k, m] = 0.0
+                    for j in range(3):
+                        if local[j] != 0.0:
+                            beyond[k, m] += R[3 * k + j] * R[3 * m + j]
+    return best, away, length, beyond
 
 
 @_compiled

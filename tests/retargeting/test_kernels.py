@@ -54,13 +54,15 @@ def test_nearest_box():
     for i in range(2):
         way = rotate(turns[i], np.array([0.0, 0.0, 0.07]))
         place = centres[i] + rotate(turns[i], [0.0, 0.0, half[i, 2]]) + way
-        found, away, length = kernels.nearest_box(
+        found, away, length, beyond = kernels.nearest_box(
             centres, matrices.reshape(2, 9), geoms, half, radius, place
         )
         assert found == i and length == pytest.approx(0.07)
+        axis = rotate(turns[i], np.array([0.0, 0.0, 1.0]))
+        np.testing.assert_allclose(beyond, np.outer(axis, axis), atol=1e-12)
         np.testing.assert_allclose(away, way, atol=1e-12)
     inside = kernels.nearest_box(centres, matrices.reshape(2, 9), geoms, half, radius, centres[0])
-    assert inside[0] == 0 and inside[2] == 0.0 and not inside[1].any()
+    assert inside[0] == 0 and inside[2] == 0.0 and not inside[1].any() and not inside[3].any()
 
 
 def test_farthest_points():
