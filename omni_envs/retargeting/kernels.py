@@ -191,6 +191,7 @@ def nearest_box(
     """
     best, least, length = 0, np.inf, 0.0
     local, away, beyond = np.empty(3), np.zeros(3), np.zeros((3, 3))
+    outside = np.zeros(3, np.bool_)
     for i in range(len(geoms)):
         R, centre = xmat[geoms[i]], xpos[geoms[i]]
         square = 0.0
@@ -199,6 +200,7 @@ def nearest_box(
             for k in range(3):
                 along += R[3 * k + j] * (place[k] - centre[k])
             local[j] = along - min(max(along, -half[i, j]), half[i, j])
+            outside[j] = abs(along) >= half[i, j]
             square += local[j] * local[j]
         distance = np.sqrt(square)
         if distance - radius[i] < least:
@@ -208,7 +210,7 @@ def nearest_box(
                 for m in range(3):
                     beyond[k, m] = 0.0
                     for j in range(3):
-                        if local[j] != 0.0:
+                        if outside[j]:
                             beyond[k, m] += R[3 * k + j] * R[3 * m + j]
     return best, away, length, beyond
 

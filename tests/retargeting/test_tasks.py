@@ -136,7 +136,7 @@ def test_contact_gap_is_to_the_surface_of_the_link(grasp, configuration, q):
 
 @pytest.mark.parametrize("way", [(0.0, 0.0, 0.3), (0.3, 0.1, 0.0), (0.2, -0.3, 0.25)])
 def test_contact_curvature_is_that_of_the_gap(configuration, q, way):
-    """½‖gap‖² of a place that moves has the curvature rootᵀ root, be it off face, edge or corner."""
+    """½‖gap‖² of a moving place has the curvature rootᵀ root, be it off face, edge or corner."""
     from omni_envs.retargeting.contact_task import _Link
 
     configuration.update(q)
