@@ -97,8 +97,7 @@ def bench_async(
     Returns:
         ``steps_per_s``, ``async_steps_per_s`` and ``ratio``, medians over the turns.
     """
-    registration.register_all()
-    one = partial(gymnasium.make, env, disable_env_checker=True, **options)
+    one = partial(_make_one, env, options)
     other = AsyncVectorEnv([one] * WORKERS)
     ours = make_vector(env, num_envs, num_threads, options)
     rng = np.random.default_rng(seed)
@@ -151,3 +150,8 @@ def _grow(env: str, num_envs: int, num_threads: int, options: dict[str, Any]) ->
     peak = peak_bytes()
     memory = None if peak is None or base is None else round((peak - base) / num_envs)
     return {"construct_seconds": construct, "bytes_per_env": memory}
+
+
+def _make_one(env: str, options: dict[str, Any]) -> gymnasium.Env:
+    registration.register_all()  # a process may be new, not forked
+    return gymnasium.make(env, disable_env_checker=True, **options)
