@@ -50,6 +50,7 @@ class CompiledTask:
         figures: Names of the rows of ``Judged.figures``, as in infos.
         flags: Names of rows of ``Judged.flags``, as in infos, without tests that are switched off.
         flag_rows: Their rows.
+        noise_share: Share of the noise on the policy's observation; see ``NoiseGrowth``.
 
     Args:
         task: The task, names resolved.
@@ -76,6 +77,7 @@ class CompiledTask:
         joints = len(task.soft_lower)
         self._widths = None if noise is None else start_widths(noise, joints)
         self._noisy = len(self.numbers.noise_width)
+        self.noise_share = 1.0
         self._nothing = np.empty((0, 0))
         self._silence = np.empty((0, 0), np.float32)
 
@@ -194,6 +196,10 @@ class CompiledTask:
         noise = self._silence
         if self._noisy:
             noise = rng.random((count, self._noisy), dtype=np.float32)
+            if self.noise_share < 1.0:
+                noise -= 0.5
+                noise *= self.noise_share
+                noise += 0.5
         if isinstance(out, dict):
             return noise, out["policy"], out["critic"]
         return noise, out, self._silence

@@ -75,6 +75,12 @@ class NoiseLevel:
             self.level = min(max(level, 0.0), 1.0)
             self._episodes, self._lasted, self._possible = 0, 0, 0
 
+    @property
+    def observed(self) -> float:
+        """Share of the noise on the policy's observation."""
+        growing = self._config is not None and self._config.observation
+        return self.level if growing else 1.0
+
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray | None:
         """Draws (count,) shares of the noise, or None: all of it."""
         return None if self._config is None else self.level * np.sqrt(rng.random(count))

@@ -189,6 +189,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._episodes = Episodes(self._library, default, num_envs, config, max_episode_steps)
         self._gate = ObjectGate(config.termination.object_after)
         self._noise = NoiseLevel(config.reset.growth)
+        self._task.noise_share = self._noise.observed
         self.sampler = MotionSampler(self._library, config.reset)
         self.divergences = DivergenceLog()
         self._scale = self.robot.action_scale * config.action.scale
@@ -242,6 +243,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self.sampler.reset()
             self._gate.reset()
             self._noise.reset()
+            self._task.noise_share = self._noise.observed
         options = dict(options or {})
         for name in options:
             if name not in RESET_OPTIONS:
@@ -336,6 +338,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             lasted = episodes.elapsed[finished], episodes.possible[finished]
             self._gate.record(*lasted)
             self._noise.record(*lasted)
+            self._task.noise_share = self._noise.observed
         if judged.push_due:
             self._push(judged.done)
         return judged

@@ -256,10 +256,13 @@ class NoiseGrowth:
     Attributes:
         share: Long enough: this share of what they could have lasted, together.
         step: How far the level moves.
+        observation: The noise on the policy's observation grows, too: it is the level times the
+            whole.
     """
 
     share: float = 0.5
     step: float = 0.02
+    observation: bool = False
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,7 @@ _QUICK = PPOConfig(
 # Actions are offsets from targets that nearly hold the reference by themselves: of everything that
 # is randomized only a disturbed start still fells the robot at once, so that grows with its skill.
 _FEEDFORWARD = {"action": {"mode": "feedforward"}}
-_GROWING = {**PRIVILEGED, "reset": {"growth": {"share": 0.4, "step": 0.02}}}
+_GROWING = {**PRIVILEGED, "reset": {"growth": {"share": 0.4, "step": 0.02, "observation": True}}}
 # λ of 0.6: the gradients of two rollouts of this size hardly agree (cosine 0.03 at λ 0.95, 0.23
 # here), and this one is the closer to the true one: twice the cosine with that of another rollout.
 # Less noise than 0.7 in the actions would save the robot from falls, and the gradient from sense.

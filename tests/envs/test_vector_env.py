@@ -506,3 +506,24 @@ def test_start_noise_grows_in_the_environment(make, quiet):
     assert (env.simulation.qpos[:, :3] != still.simulation.qpos[:, :3]).all()
     env.reset(seed=0)
     assert env.noise_level == 0.0
+
+
+@pytest.mark.parametrize("observation", [False, True])
+def test_observation_noise_grows_where_asked_to(make, quiet, observation):
+    growth = {"share": 0.0, "step": 0.5, "observation": observation}
+    options = {**quiet, "observation": {"noise": {}, "privileged": True}}
+    env = make(8, **{**options, "reset": {"noise": None, "growth": growth}}, max_episode_steps=2)
+
+    def noise():
+        seen, _ = env.reset(options={"frame": 5})
+        return np.abs(seen["policy"] - seen["critic"][:, :160]).max()
+
+    env.reset(seed=0)
+    assert noise() == 0.0 if observation else noise() > 0.4
+    for _ in range(30):
+        env.step(np.zeros((8, 29)))
+    assert env.noise_level == 0.5
+    assert 0.2 < noise() <= 0.25 if observation else noise() > 0.4
+    for _ in range(30):
+        env.step(np.zeros((8, 29)))
+    assert 0.4 < noise() <= 0.5
