@@ -1,5 +1,6 @@
 """What the pages say is what the package does."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -27,3 +28,14 @@ def test_every_naming_is_in_the_table(naming):
 
 def test_the_conversion_of_omomo_is_the_one_that_errors_name():
     assert CONVERSION in SOURCES.read_text()
+
+
+NUMBERS = Path(__file__).parents[1] / "docs/paper_numbers.md"
+
+
+def test_every_test_that_pins_a_number_exists():
+    named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", NUMBERS.read_text())
+    assert len(named) > 25
+    root = NUMBERS.parents[1]
+    for file, test in named:
+        assert f"def {test}" in (root / file).read_text(), f"{file}::{test}"
