@@ -106,7 +106,7 @@ class RetargetOptions:
     self_distance: float = 0.02
     stance: StanceOptions = field(default_factory=StanceOptions)
     velocity_limits: float | None = 1.0
-    restoration_iterations: int = 3
+    restoration_iterations: int = 5
     restoration_tolerance: float = 2e-5
     solver: Solver = "daqp"
     backend: Backend = "mink"
