@@ -15,6 +15,7 @@ import numpy as np
 import trimesh
 
 from omni_envs import rotations
+from omni_envs.demonstrations.resampling import FPS
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.demonstrations.surface import closest_points
 from omni_envs.errors import InvalidOptionError
@@ -151,7 +152,7 @@ def vary(source: SourceMotion, variation: Variation) -> SourceMotion:
     A human far away from the object does not interact with it: there the mesh sees it where it was,
     and comes to see it where it is on the way to it. An object of
     another size keeps the height of its lowest point. Touched points go with the surface. A foot
-    that stands on the second frame stands on the first, too: there it shall start.
+    that stands after the first step stands on the first frame, too: there it shall start.
 
     Args:
         source: The motion, not varied before.
@@ -201,8 +202,14 @@ def vary(source: SourceMotion, variation: Variation) -> SourceMotion:
         object_poses=poses,
         mesh_object_poses=seen,
         contact_points=points,
-        stance={mode: np.concatenate([at[1:2], at[1:]]) for mode, at in source.stance.items()},
+        stance={mode: _from_the_start(at, source.fps) for mode, at in source.stance.items()},
     )
+
+
+def _from_the_start(stance: np.ndarray, fps: float) -> np.ndarray:
+    """Stance looks back, so no schedule has its first step; this one has it where it goes on."""
+    step = min(int(np.ceil(fps / FPS - 1e-9)), len(stance) - 1)
+    return np.concatenate([np.repeat(stance[step : step + 1], step, axis=0), stance[step:]])
 
 
 def _check_names(values: Mapping[str, Any]) -> None:

@@ -12,6 +12,7 @@ from omni_envs.demonstrations import (
     variation_grid,
     vary,
 )
+from omni_envs.demonstrations.source_resampling import resample_source
 from omni_envs.demonstrations.variation import HEIGHTS, POSES
 from omni_envs.errors import InvalidOptionError
 from omni_envs.retargeting.surface_points import surface_points
@@ -150,6 +151,17 @@ def test_far_from_the_object_the_mesh_sees_it_where_it_was(carry):
     np.testing.assert_allclose(seen[begins], new[begins], atol=1e-9)
     assert np.abs(np.diff(seen[:, :3], axis=0)).max() * carry.fps < 1.0
     np.testing.assert_allclose(np.linalg.norm(seen[:, 3:], axis=1), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("fps", [30.0, 50.0, 120.0])
+def test_feet_that_stand_stand_from_the_first_frame(carry, fps):
+    source = resample_source(carry, fps)
+    varied = vary(source, Variation(object_yaw=0.1))
+    for mode, stance in varied.stance.items():
+        assert stance.shape == source.stance[mode].shape
+        assert stance[0].all() and not source.stance[mode][0].any()  # box_carry starts standing
+        later = int(np.ceil(fps / 30.0))
+        np.testing.assert_array_equal(stance[later:], source.stance[mode][later:])
 
 
 def test_a_variation_of_nothing_changes_nothing(carry):
