@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import asdict, replace
 
 import numpy as np
 
 from omni_envs import rotations
 from omni_envs.demonstrations import Demonstration, scale_demonstration
+from omni_envs.demonstrations.jumps import SPEED, find_jumps
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.demonstrations.source_resampling import resample_source
 from omni_envs.demonstrations.variation import Variation, vary
@@ -19,7 +21,7 @@ from omni_envs.references.key import content_hashes, reference_key, versions
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.reference import Reference
 from omni_envs.retargeting import RetargetOptions, refine, retarget
-from omni_envs.robots import Robot, get_robot
+from omni_envs.robots import KEYPOINTS, Robot, get_robot
 from omni_envs.scenes import OBJECT
 
 STANCE = "default"
@@ -66,7 +68,9 @@ def make_reference(
         raise InvalidDataError("Reference", "fps", "positive", str(fps))
     # The source is resampled, not the result: so the retargeter holds every constraint on every
     # frame of the reference, and interpolation cannot break one.
-    source = resample_source(scale_demonstration(demonstration, robot.height), fps)
+    source = scale_demonstration(demonstration, robot.height)
+    _warn_of_jumps(source)
+    source = resample_source(source, fps)
     passes = 2 if options.refine else 1
     anchor = None
     if varied:
@@ -117,6 +121,20 @@ def make_reference(
             "solve_seconds": float(motion.frames.seconds.sum()),
         },
     )
+
+
+def _warn_of_jumps(source: SourceMotion) -> None:
+    """Limits on speed keep the robot from jumping along, so nothing in its report would tell."""
+    jumps = find_jumps(source.keypoints, source.fps, source.scale)
+    if len(jumps):
+        frames = np.unique(jumps[:, 0])
+        joints = ", ".join(KEYPOINTS[j] for j in np.unique(jumps[:, 1]))
+        shown = ", ".join(map(str, frames[:8].tolist())) + (", …" if len(frames) > 8 else "")
+        warnings.warn(
+            f"Demonstration {source.name!r} jumps to frame {shown} ({joints}; faster than "
+            f"{SPEED:g} m/s): swapped markers or lost frames? The reference goes astray there.",
+            stacklevel=3,
+        )
 
 
 def _check_ground(nominal: SourceMotion, varied: SourceMotion) -> None:

@@ -139,3 +139,12 @@ def test_a_variation_inside_of_the_robot_is_refused(whole):
             variation=Variation(object_translation=(-reach, 0.0), object_scale=(1.0, 1.0, 3.0)),
             nominal=whole,
         )
+
+
+def test_jumps_of_the_recording_are_told(demonstration):
+    positions = demonstration.positions.copy()
+    positions[15] += [1.0, 0.0, 0.0]
+    broken = replace(demonstration, positions=positions)
+    with pytest.warns(UserWarning, match=r"box_carry.* jumps to frame 15, 16 \(pelvis, "):
+        made = make_reference(broken, "g1", fps=30.0)
+    assert made.report.summary()["velocity_violation_max_rad_s"] == 0
