@@ -241,8 +241,8 @@ def _seen(source: SourceMotion, poses: np.ndarray) -> np.ndarray:
     old, here = source.object_poses, source.source_object_poses
     assert old is not None and here is not None and source.scene.object is not None
     hands = source.keypoints[:, [KEYPOINTS.index(f"{side}_hand") for side in SIDES]]
-    turns = np.repeat(rotations.conjugate(here[:, None, 3:]), 2, axis=1)
-    local = rotations.rotate(turns, hands - here[:, None, :3]).reshape(-1, 3)
+    back = rotations.conjugate(here[:, None, 3:])
+    local = rotations.rotate(back, hands - here[:, None, :3]).reshape(-1, 3)
     parts = source.scene.object.scaled(source.scale).parts
     distance = closest_points(parts, local)[1].reshape(-1, 2).min(axis=1)
     nearness = np.clip((_FAR * source.scale - distance) / ((_FAR - _NEAR) * source.scale), 0.0, 1.0)
@@ -256,9 +256,7 @@ def _standing(poses: np.ndarray, before: SceneObject, after: SceneObject) -> np.
 
     def lowest(thing: SceneObject) -> np.ndarray:
         corners = np.asarray(thing.surface().vertices)
-        turns = np.repeat(poses[:, None, 3:], len(corners), axis=1)
-        points = rotations.rotate(turns, np.broadcast_to(corners, (*turns.shape[:2], 3)))
-        return points[..., 2].min(axis=1)
+        return rotations.rotate(poses[:, None, 3:], corners)[..., 2].min(axis=1)
 
     poses = poses.copy()
     poses[:, 2] += lowest(before) - lowest(after)
@@ -317,7 +315,7 @@ class _Stretch:
         mesh = part.mesh()
         moved = self.points(np.asarray(mesh.vertices))
         if isinstance(part.shape, Box):
-            sides = rotations.rotate(np.tile(part.quaternion, (3, 1)), np.eye(3))
+            sides = rotations.rotate(np.asarray(part.quaternion), np.eye(3))
             scale = np.array([np.linalg.norm(self._linear(s)) for s in sides])
             if all(np.linalg.norm(np.cross(self._linear(s), s)) < 1e-9 for s in sides):
                 middle = 0.5 * (moved.min(axis=0) + moved.max(axis=0))

@@ -157,7 +157,7 @@ def _depth_in_ground(source: SourceMotion) -> float:
         return 0.0
     pose = source.object_poses[0]
     corners = np.asarray(source.scene.object.surface().vertices)
-    turned = rotations.rotate(np.tile(pose[3:], (len(corners), 1)), corners)
+    turned = rotations.rotate(pose[3:], corners)
     return -float(pose[2] + turned[:, 2].min())
 
 

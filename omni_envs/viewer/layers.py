@@ -59,10 +59,8 @@ def mesh_edges(source: SourceMotion, frame: int) -> np.ndarray:
     if source.source_object_poses is not None and source.object_poses is not None:
         seen = source.object_poses if source.mesh_object_poses is None else source.mesh_object_poses
         here, there = source.source_object_poses[frame], seen[frame]
-        turn = np.broadcast_to(rotations.conjugate(here[3:]), (len(local), 4))
-        local = rotations.rotate(turn, local - here[:3])
-        turn = np.broadcast_to(there[3:], (len(target), 4))
-        world = there[:3] + rotations.rotate(turn, target)
+        local = rotations.rotate(rotations.conjugate(here[3:]), local - here[:3])
+        world = there[:3] + rotations.rotate(there[3:], target)
     vertices = np.concatenate([local, _of_frame(points.source, frame)])
     body = len(local)
     adjacent = connect(vertices[None]).adjacency(0)[:body]

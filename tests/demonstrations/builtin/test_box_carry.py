@@ -26,11 +26,6 @@ def demo():
 
 
 @pytest.fixture(scope="module")
-def joint(demo):
-    return {name: demo.positions[:, i] for i, name in enumerate(demo.joint_names)}
-
-
-@pytest.fixture(scope="module")
 def held(demo):
     return demo.contacts["left_hand"]
 

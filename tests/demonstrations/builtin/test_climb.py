@@ -4,7 +4,6 @@ import pytest
 from omni_envs.demonstrations import (
     builtin_demonstration,
     closest_points,
-    scale_demonstration,
     stance_intervals,
 )
 from omni_envs.demonstrations.builtin import human
@@ -17,16 +16,6 @@ DT = 1 / 30
 @pytest.fixture(scope="module")
 def demo():
     return builtin_demonstration("climb")
-
-
-@pytest.fixture(scope="module")
-def joint(demo):
-    return {name: demo.positions[:, i] for i, name in enumerate(demo.joint_names)}
-
-
-@pytest.fixture(scope="module")
-def source(demo):
-    return scale_demonstration(demo, 1.32)
 
 
 def norm(v):
