@@ -72,13 +72,6 @@ def step_bounds(
     return lower, upper
 
 
-def step_objective(
-    configuration: Kinematics, tasks: Sequence[CostTask]
-) -> tuple[np.ndarray, np.ndarray]:
-    """H and g of the sum of all tasks."""
-    return step_model(configuration, tasks)[:2]
-
-
 def step_model(
     configuration: Kinematics, tasks: Sequence[CostTask]
 ) -> tuple[np.ndarray, np.ndarray, float]:

@@ -13,7 +13,7 @@ from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, Rows
 from omni_envs.retargeting.proximal_task import ProximalTask
-from omni_envs.retargeting.qp import StepQP, step_bounds, step_objective, step_rows
+from omni_envs.retargeting.qp import StepQP, step_bounds, step_model, step_rows
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.robots import G1
 
@@ -39,7 +39,7 @@ def parts(source, solved, t):
 
 def program(source, solved, t, radius):
     configuration, tasks, bounds, limits = parts(source, solved, t)
-    H, g = step_objective(configuration, tasks)
+    H, g = step_model(configuration, tasks)[:2]
     lower, upper = step_bounds(configuration, bounds)
     rows = step_rows(configuration, limits)
     return StepQP(H, g, lower, upper, rows, configuration.metric, radius)
