@@ -50,6 +50,10 @@ class Arguments:
     seed: int = 0
     """Seed of network, exploration and environment."""
 
+    device: Literal["auto", "cpu", "cuda"] | None = None
+    """Where the network learns; auto takes a GPU where there is one. By default the CPU, or the
+    device of the run to resume. Physics is on the CPU."""
+
     resume: bool = False
     """Go on from the last checkpoint in the run directory, with the settings saved there."""
 
@@ -79,6 +83,8 @@ def make_config(arguments: Arguments) -> TrainConfig:
         "time_limit": arguments.time_limit,
         "evaluation_episodes": arguments.episodes,
     }
+    if arguments.device is not None:
+        ends["device"] = arguments.device
     if arguments.resume:
         config = TrainConfig.load(arguments.out)
         if config.env != arguments.env:

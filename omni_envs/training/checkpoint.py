@@ -34,6 +34,7 @@ class Checkpoint:
         policy: Weights and observation statistics.
         optimizer: State of the optimiser.
         rng: State of torch's random generator.
+        device_rng: State of the GPU's random generator, or None for training on the CPU.
         history: One row of figures per update.
         episodes: Return and length of the episodes that finished last, which the means in
             ``history`` are over.
@@ -48,6 +49,7 @@ class Checkpoint:
     rng: Tensor
     history: list[dict[str, float]] = field(default_factory=list)
     episodes: list[tuple[float, float]] = field(default_factory=list)
+    device_rng: Tensor | None = None
 
     def save(self, run: Path) -> Path:
         """Writes the checkpoint into a run directory; it is there whole or not at all."""
@@ -55,7 +57,7 @@ class Checkpoint:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_suffix(f".{os.getpid()}.partial")
         with partial.open("wb") as file:
-            torch.save({"format": _FORMAT, **vars(self)}, file)
+            torch.save({"format": _FORMAT, **_on_cpu(vars(self))}, file)
             file.flush()
             os.fsync(file.fileno())
         partial.replace(path)
@@ -71,7 +73,7 @@ class Checkpoint:
         if not path.is_file():
             raise FileFormatError(path, "file", "a checkpoint", "nothing")
         try:
-            data = torch.load(path, weights_only=True)
+            data = torch.load(path, map_location="cpu", weights_only=True)
         except (RuntimeError, OSError, EOFError, pickle.UnpicklingError, ValueError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise FileFormatError(path, "content", "a whole checkpoint", reason) from error
@@ -81,6 +83,15 @@ class Checkpoint:
             return cls(**data)
         except TypeError as error:
             raise FileFormatError(path, "fields", "those of a checkpoint", str(error)) from error
+
+
+def _on_cpu(data: Any) -> Any:
+    """Returns nested data with every tensor on the CPU: files do not tell where they were made."""
+    if isinstance(data, Tensor):
+        return data.cpu()
+    if isinstance(data, dict):
+        return {key: _on_cpu(value) for key, value in data.items()}
+    return [_on_cpu(value) for value in data] if isinstance(data, list) else data
 
 
 def checkpoints(run: Path) -> list[Path]:

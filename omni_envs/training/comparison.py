@@ -14,7 +14,7 @@ from omni_envs.errors import FileFormatError, InvalidDataError, MissingDependenc
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.curve import CURVE_CSV, smoothed
 
-ITS_OWN = ("seed", "out", "num_threads", "steps", "time_limit", "checkpoint_every")
+ITS_OWN = ("seed", "out", "num_threads", "device", "steps", "time_limit", "checkpoint_every")
 """Fields of ``TrainConfig`` that do not change what is learnt."""
 COLOURS = ("#1f5fa8", "#d1662b", "#3c8f53", "#8a4fa3", "#a8871f", "#4d4d4d")
 PANELS = (

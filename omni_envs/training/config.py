@@ -13,6 +13,7 @@ from omni_envs.errors import FileFormatError, InvalidOptionError
 
 CONFIG_FILE = "config.json"
 TRAINERS = ("sb3", "torchrl")
+DEVICES = ("auto", "cpu", "cuda")
 PRIVILEGED: Mapping[str, Any] = {"observation": {"privileged": True}}
 """Training options of an asymmetric critic."""
 
@@ -85,6 +86,8 @@ class TrainConfig:
         num_envs: Simulations.
         num_threads: Physics threads; 0 takes every core.
         seed: Seed of the network, the exploration and the environment.
+        device: Where the network learns: ``"cpu"``, ``"cuda"``, or ``"auto"``, a GPU where there is
+            one. Physics is on the CPU. Runs with the same seed are the same to the bit on the CPU.
         env_options: Options of the environment, as ``gymnasium.make`` takes them, JSON-compatible:
             the task that the policy is for, and is evaluated on.
         training_options: Options over those in training alone: what helps to learn, such as a
@@ -102,6 +105,7 @@ class TrainConfig:
     num_envs: int = 256
     num_threads: int = 0
     seed: int = 0
+    device: Literal["auto", "cpu", "cuda"] = "cpu"
     env_options: Mapping[str, Any] = field(default_factory=dict)
     training_options: Mapping[str, Any] = field(default_factory=lambda: PRIVILEGED)
     time_limit: float = 0.0
@@ -115,6 +119,10 @@ class TrainConfig:
         if self.trainer not in TRAINERS:
             raise InvalidOptionError(
                 f"TrainConfig: trainer must be 'sb3' or 'torchrl'; got {self.trainer!r}."
+            )
+        if self.device not in DEVICES:
+            raise InvalidOptionError(
+                f"TrainConfig: device must be 'auto', 'cpu' or 'cuda'; got {self.device!r}."
             )
         object.__setattr__(self, "out", Path(self.out))
         for name in ("env_options", "training_options"):
@@ -161,6 +169,7 @@ class TrainConfig:
             "time-limit": self.time_limit,
             "num-envs": self.num_envs,
             "seed": self.seed,
+            "device": self.device,
             "episodes": self.evaluation_episodes,
             "env-options": json.dumps(data["env_options"]),
             "training-options": json.dumps(data["training_options"]),

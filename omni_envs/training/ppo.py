@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +27,7 @@ except ImportError as error:
     raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
 
 from omni_envs.training.config import PPOConfig
+from omni_envs.training.device import read, second_worker
 from omni_envs.training.learning_rate import adapted_learning_rate
 from omni_envs.training.policy import TrackingPolicy
 from omni_envs.training.torch_threads import torch_threads
@@ -60,7 +59,8 @@ class Rollout:
 
     def minibatches(self, count: int) -> Iterator[Rollout]:
         """Yields ``count`` random parts, every sample in exactly one."""
-        for index in torch.randperm(len(self.actions)).tensor_split(count):
+        order = torch.randperm(len(self.actions), device=self.actions.device)
+        for index in order.tensor_split(count):
             yield Rollout(**{name: _take(value, index) for name, value in vars(self).items()})
 
 
@@ -71,6 +71,7 @@ class TrackingPPO(PPO):
         env: SB3 vector environment.
         config: Hyper-parameters.
         seed: Seed of network, exploration and environment.
+        device: Where the network lives and learns.
 
     Attributes:
         current_learning_rate: Learning rate of the next gradient step.
@@ -86,6 +87,7 @@ class TrackingPPO(PPO):
         env: VecEnv,
         config: PPOConfig | None = None,
         seed: int | None = None,
+        device: torch.device | str = "cpu",
     ) -> None:
         config = config or PPOConfig()
         self.config = config
@@ -109,7 +111,7 @@ class TrackingPPO(PPO):
                 "optimizer_kwargs": {"fused": True},
             },
             seed=seed,
-            device="cpu",
+            device=device,
             stats_window_size=max(100, env.num_envs),
         )
         if config.critic_learning_rate:
@@ -143,7 +145,7 @@ class TrackingPPO(PPO):
         buffer = self.rollout_buffer
 
         def flat(array: Any) -> Tensor:
-            return torch.from_numpy(array).flatten(0, 1)
+            return torch.from_numpy(array).flatten(0, 1).to(self.device)
 
         seen = buffer.observations
         seen = {k: flat(v) for k, v in seen.items()} if isinstance(seen, dict) else flat(seen)
@@ -164,39 +166,43 @@ class TrackingPPO(PPO):
     def _update(self, rollout: Rollout) -> None:
         config, policy = self.config, self.policy
         policy.set_training_mode(True)
-        totals: Counter[str] = Counter()
-        last = 0.0
-        # Actor and critic share no weights: each learns in its own thread, so that two cores are
-        # busy without waiting for each other inside every small matrix product.
-        with ThreadPoolExecutor(1) as second:
-            for epoch in range(config.epochs):
+        taken: list[dict[str, Tensor]] = []
+        figures: list[dict[str, float]] = []
+        with second_worker(self.device) as second:
+            for _ in range(config.epochs):
                 for batch in rollout.minibatches(config.minibatches):
                     policy.optimizer.zero_grad()
                     value = second.submit(self._critic_backward, batch)
-                    figures = self._actor_backward(batch) | value.result()
-                    if not all(map(math.isfinite, figures.values())):
-                        raise OmniEnvsError(
-                            f"Training diverged after {self.num_timesteps} steps: {figures}. "
-                            "Resume from a checkpoint with a smaller learning rate."
-                        )
+                    taken.append(self._actor_backward(batch) | value.result())
                     if config.adapt_every == "minibatch":
-                        self._adapt_learning_rate(figures["kl"])
+                        figures += self._read(taken)
+                        self._adapt_learning_rate(figures[-1]["kl"])
                     nn.utils.clip_grad_norm_(policy.parameters(), config.max_grad_norm)
                     policy.optimizer.step()
-                    totals.update(figures)
-                    if epoch == config.epochs - 1:
-                        last += figures["kl"] / config.minibatches
                 self._n_updates += 1
+        figures += self._read(taken)
         if config.adapt_every == "update":
-            self._adapt_learning_rate(last)
-        steps = config.epochs * config.minibatches
+            last = figures[-config.minibatches :]
+            self._adapt_learning_rate(sum(row["kl"] / config.minibatches for row in last))
         self.figures = {
-            **{name: total / steps for name, total in totals.items()},
+            **{name: sum(row[name] for row in figures) / len(figures) for name in figures[0]},
             "learning_rate": self.current_learning_rate,
             "action_std": policy.log_std.exp().mean().item(),
         }
 
-    def _actor_backward(self, batch: Rollout) -> dict[str, float]:
+    def _read(self, taken: list[dict[str, Tensor]]) -> list[dict[str, float]]:
+        """Empties the list of what was not read yet; a GPU has to have come so far."""
+        figures = read(taken)
+        taken.clear()
+        for row in figures:
+            if not all(map(math.isfinite, row.values())):
+                raise OmniEnvsError(
+                    f"Training diverged after {self.num_timesteps} steps: {row}. "
+                    "Resume from a checkpoint with a smaller learning rate."
+                )
+        return figures
+
+    def _actor_backward(self, batch: Rollout) -> dict[str, Tensor]:
         """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
         clip = self.config.clip
         now = self.policy.get_distribution(batch.observations).distribution
@@ -209,18 +215,18 @@ class TrackingPPO(PPO):
         with torch.no_grad():
             kl = _gaussian_kl(batch.mean, batch.std, now.mean, now.stddev)
         return {
-            "kl": kl.item(),
-            "surrogate_loss": surrogate.item(),
-            "entropy": entropy.item(),
-            "clip_fraction": (ratio != clipped).float().mean().item(),
+            "kl": kl,
+            "surrogate_loss": surrogate.detach(),
+            "entropy": entropy.detach(),
+            "clip_fraction": (ratio != clipped).float().mean(),
         }
 
-    def _critic_backward(self, batch: Rollout) -> dict[str, float]:
+    def _critic_backward(self, batch: Rollout) -> dict[str, Tensor]:
         """Adds the gradient of the value loss, the larger of the plain and the clipped one."""
         values = self.policy.predict_values(batch.observations).flatten()
         loss = _value_loss(values, batch.values, batch.returns, self.config.value_clip)
         (self.config.value_weight * loss).backward()
-        return {"value_loss": loss.item()}
+        return {"value_loss": loss.detach()}
 
     def _adapt_learning_rate(self, kl: float) -> None:
         rate = adapted_learning_rate(self.current_learning_rate, kl, self.config.desired_kl)

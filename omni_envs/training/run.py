@@ -19,6 +19,7 @@ except ImportError as error:
 from omni_envs.training.checkpoint import Checkpoint, checkpoints, keep_newest
 from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.curve import write_history
+from omni_envs.training.device import torch_device
 from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.environment import make_env
 from omni_envs.training.learner import History, Learner, autoreset_mode, make_learner
@@ -67,7 +68,7 @@ def train(
 
     Raises:
         InvalidOptionError: The run directory is in use, there is nothing to resume, or there is no
-            such environment.
+            such environment or device.
         FileFormatError: The checkpoint to resume from is damaged.
         MissingDependencyError: The trainer is not installed.
         OmniEnvsError: Training diverged.
@@ -79,6 +80,7 @@ def train(
         )
     if resume and not found:
         raise InvalidOptionError(f"{config.out} holds no checkpoint to resume from.")
+    torch_device(config.device)  # fails before the environment is made
     options = merged(config.env_options, config.training_options)
     mode = {"autoreset_mode": autoreset_mode(config).name}
     made = env or make_env(config, config.num_envs, {**options, **mode})

@@ -18,6 +18,7 @@ except ImportError as error:
 
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
+from omni_envs.training.device import device_rng, restore_rng, torch_device
 from omni_envs.training.learner import History
 from omni_envs.training.ppo import TrackingPPO
 from omni_envs.training.rollout import BODY_ERROR
@@ -35,7 +36,8 @@ class SB3Learner:
     def __init__(self, config: TrainConfig, env: VectorEnv) -> None:
         adapter = SB3VecEnv(env)
         self._seed, self._env = config.seed, env
-        self._ppo = TrackingPPO(VecMonitor(adapter), config.ppo, seed=config.seed)
+        self._device = torch_device(config.device)
+        self._ppo = TrackingPPO(VecMonitor(adapter), config.ppo, config.seed, self._device)
         self._errors = _TrackingError(adapter)
 
     @property
@@ -71,6 +73,7 @@ class SB3Learner:
             policy=ppo.policy.state_dict(),
             optimizer=ppo.policy.optimizer.state_dict(),
             rng=torch.get_rng_state(),
+            device_rng=device_rng(self._device),
             history=history,
             episodes=[(float(e["r"]), float(e["l"])) for e in ppo.ep_info_buffer or ()],
         )
@@ -85,8 +88,9 @@ class SB3Learner:
         window = ppo._stats_window_size
         ppo.ep_info_buffer = deque(({"r": r, "l": n} for r, n in state.episodes), maxlen=window)
         ppo.ep_success_buffer = deque(maxlen=window)
-        ppo.env.seed((self._seed + state.steps) % 2**31)
-        torch.set_rng_state(state.rng)
+        seed = (self._seed + state.steps) % 2**31
+        ppo.env.seed(seed)
+        restore_rng(self._device, state.rng, state.device_rng, seed)
 
     def close(self) -> None:
         """Nothing to free: the environment belongs to the caller."""

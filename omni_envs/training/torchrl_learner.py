@@ -21,6 +21,7 @@ except ImportError as error:
 
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
+from omni_envs.training.device import device_rng, restore_rng, torch_device
 from omni_envs.training.learner import History
 from omni_envs.training.rollout import BODY_ERROR
 from omni_envs.training.torch_threads import torch_threads
@@ -40,6 +41,7 @@ class TorchRLLearner:
     def __init__(self, config: TrainConfig, env: VectorEnv) -> None:
         torch.manual_seed(config.seed)
         self._config, self._vector = config, env
+        self._device = torch_device(config.device)
         self._env = make_torchrl_env(env, infos=(BODY_ERROR,))
         keys = list(self._env.observation_spec.keys())
         seen, privileged = observation_keys(keys)
@@ -51,7 +53,7 @@ class TorchRLLearner:
             torch.as_tensor(space.high),
             config.ppo.hidden,
             config.ppo.initial_std,
-        )
+        ).to(self._device)
         self.ppo = TensorDictPPO(network, *actor_and_critic(network, keys), config.ppo)
         self._env.set_seed(config.seed)
         self._steps = 0
@@ -71,6 +73,9 @@ class TorchRLLearner:
                 self._env,
                 self.ppo.actor,
                 frames_per_batch=self._config.ppo.rollout_steps * self._env.batch_size.numel(),
+                env_device="cpu",
+                policy_device=self._device,
+                storing_device=self._device,
                 auto_register_policy_transforms=False,
             )
             self._rollouts = iter(self._collector)
@@ -102,6 +107,7 @@ class TorchRLLearner:
             policy=self.ppo.network.state_dict(),
             optimizer=self.ppo.optimizer.state_dict(),
             rng=torch.get_rng_state(),
+            device_rng=device_rng(self._device),
             history=history,
             episodes=list(self._episodes),
         )
@@ -113,8 +119,9 @@ class TorchRLLearner:
         self.ppo.learning_rate, self.ppo.updates = state.learning_rate, state.updates
         self._steps = state.steps
         self._episodes.extend(state.episodes)
-        self._env.set_seed((self._config.seed + state.steps) % 2**31)
-        torch.set_rng_state(state.rng)
+        seed = (self._config.seed + state.steps) % 2**31
+        self._env.set_seed(seed)
+        restore_rng(self._device, state.rng, state.device_rng, seed)
 
     def close(self) -> None:
         """Frees the collector; the environment belongs to the caller."""

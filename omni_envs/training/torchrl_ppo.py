@@ -13,8 +13,6 @@ rollout and its update see the same network.
 from __future__ import annotations
 
 import math
-from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from omni_envs.errors import MissingDependencyError, OmniEnvsError
@@ -31,6 +29,7 @@ except ImportError as error:
     raise MissingDependencyError("torchrl", "torchrl", "Training with TorchRL") from error
 
 from omni_envs.training.config import PPOConfig
+from omni_envs.training.device import read, second_worker
 from omni_envs.training.learning_rate import adapted_learning_rate
 from omni_envs.training.torchrl_network import TrackingNetwork
 
@@ -130,39 +129,46 @@ class TensorDictPPO:
             samples: (B,) observations, ``action``, ``action_log_prob``, ``loc``, ``scale``,
                 ``state_value``, ``value_target`` and ``advantage``.
         """
-        config, totals, last = self.config, Counter[str](), 0.0
-        # Actor and critic share no weights: each learns in its own thread, so that two cores are
-        # busy without waiting for each other inside every small matrix product.
-        with ThreadPoolExecutor(1) as second:
-            for epoch in range(config.epochs):
-                for index in torch.randperm(len(samples)).tensor_split(config.minibatches):
+        config, device = self.config, self.network.log_std.device
+        taken: list[dict[str, Tensor]] = []
+        figures: list[dict[str, float]] = []
+        with second_worker(device) as second:
+            for _ in range(config.epochs):
+                order = torch.randperm(len(samples), device=device)
+                for index in order.tensor_split(config.minibatches):
                     batch = samples[index]
                     self.optimizer.zero_grad()
                     value = second.submit(self.critic_backward, batch)
-                    figures = self.actor_backward(batch) | value.result()
-                    if not all(map(math.isfinite, figures.values())):
-                        raise OmniEnvsError(
-                            f"Training diverged after {self.updates} passes: {figures}. "
-                            "Resume from a checkpoint with a smaller learning rate."
-                        )
+                    taken.append(self.actor_backward(batch) | value.result())
                     if config.adapt_every == "minibatch":
-                        self.adapt_learning_rate(figures["kl"])
+                        figures += self._read(taken)
+                        self.adapt_learning_rate(figures[-1]["kl"])
                     nn.utils.clip_grad_norm_(self.network.parameters(), config.max_grad_norm)
                     self.optimizer.step()
-                    totals.update(figures)
-                    if epoch == config.epochs - 1:
-                        last += figures["kl"] / config.minibatches
                 self.updates += 1
+        figures += self._read(taken)
         if config.adapt_every == "update":
-            self.adapt_learning_rate(last)
-        steps = config.epochs * config.minibatches
+            last = figures[-config.minibatches :]
+            self.adapt_learning_rate(sum(row["kl"] / config.minibatches for row in last))
         return {
-            **{name: total / steps for name, total in totals.items()},
+            **{name: sum(row[name] for row in figures) / len(figures) for name in figures[0]},
             "learning_rate": self.learning_rate,
             "action_std": self.network.log_std.exp().mean().item(),
         }
 
-    def actor_backward(self, batch: TensorDictBase) -> dict[str, float]:
+    def _read(self, taken: list[dict[str, Tensor]]) -> list[dict[str, float]]:
+        """Empties the list of what was not read yet; a GPU has to have come so far."""
+        figures = read(taken)
+        taken.clear()
+        for row in figures:
+            if not all(map(math.isfinite, row.values())):
+                raise OmniEnvsError(
+                    f"Training diverged after {self.updates} passes: {row}. "
+                    "Resume from a checkpoint with a smaller learning rate."
+                )
+        return figures
+
+    def actor_backward(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
         losses = self.policy_loss(batch)
         (losses["loss_objective"] + losses["loss_entropy"]).backward()
@@ -170,18 +176,18 @@ class TensorDictPPO:
             acted = IndependentNormal(batch["loc"], batch["scale"]).base_dist
             kl = kl_divergence(acted, self.policy_loss.now.base_dist)
         return {
-            "kl": kl.sum(dim=-1).mean().item(),
-            "surrogate_loss": losses["loss_objective"].item(),
-            "entropy": losses["entropy"].item(),
-            "clip_fraction": losses["clip_fraction"].item(),
+            "kl": kl.sum(dim=-1).mean(),
+            "surrogate_loss": losses["loss_objective"].detach(),
+            "entropy": losses["entropy"].detach(),
+            "clip_fraction": losses["clip_fraction"].detach(),
         }
 
-    def critic_backward(self, batch: TensorDictBase) -> dict[str, float]:
+    def critic_backward(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """Adds the gradient of the value loss; returns the figures to log."""
         losses, *_ = self.value_loss(batch.clone(False))
         loss = losses.mean()
         (self.config.value_weight * loss).backward()
-        return {"value_loss": loss.item()}
+        return {"value_loss": loss.detach()}
 
     def adapt_learning_rate(self, kl: float) -> None:
         """Has the learning rate of the next gradient step follow the divergence."""

@@ -13,6 +13,7 @@ from tensordict import TensorDict
 from torchrl.collectors import Collector
 
 from omni_envs.training.config import PPOConfig
+from omni_envs.training.device import read
 from omni_envs.training.ppo import Rollout, TrackingPPO
 from omni_envs.training.sb3_vec_env import SB3VecEnv
 from omni_envs.training.torchrl_env import make_torchrl_env
@@ -66,9 +67,9 @@ def test_same_batch_same_losses_and_gradient(chase, value_clip):
             one.add_(0.05 * torch.randn(one.shape))
             other.copy_(one)
     learner.policy.optimizer.zero_grad()
-    expected = learner._actor_backward(rollout) | learner._critic_backward(rollout)
+    (expected,) = read([learner._actor_backward(rollout) | learner._critic_backward(rollout)])
     batch = _batch(rollout)
-    found = ppo.actor_backward(batch) | ppo.critic_backward(batch)
+    (found,) = read([ppo.actor_backward(batch) | ppo.critic_backward(batch)])
     assert 0.02 < expected["clip_fraction"] < 0.98
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6)
     for (name, one), other in zip(
