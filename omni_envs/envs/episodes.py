@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +47,16 @@ class ObjectGate:
         full = len(self._recent) == GATE_EPISODES
         self.open = full and sum(self._recent) >= self._share * GATE_EPISODES
 
+    def state(self) -> dict[str, Any]:
+        """Returns what ``restore`` takes, JSON-compatible."""
+        return {"open": self.open, "recent": list(self._recent)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Goes on from what ``state`` returned."""
+        self.reset()
+        self.open = self.open or bool(state["open"])
+        self._recent.extend(state["recent"])
+
 
 class NoiseLevel:
     """How much of the start noise episodes get; see ``NoiseGrowth``.
@@ -74,6 +86,19 @@ class NoiseLevel:
             level = self.level + (self._config.step if good else -self._config.step)
             self.level = min(max(level, 0.0), 1.0)
             self._episodes, self._lasted, self._possible = 0, 0, 0
+
+    def state(self) -> dict[str, Any]:
+        """Returns what ``restore`` takes, JSON-compatible."""
+        counts = {"episodes": self._episodes, "lasted": self._lasted, "possible": self._possible}
+        return {"level": self.level, **counts}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Goes on from what ``state`` returned; noise that does not grow stays whole."""
+        self.reset()
+        if self._config is not None:
+            self.level = float(state["level"])
+            names = ("episodes", "lasted", "possible")
+            self._episodes, self._lasted, self._possible = (int(state[n]) for n in names)
 
     @property
     def observed(self) -> float:

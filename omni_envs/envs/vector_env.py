@@ -22,6 +22,7 @@ from omni_envs.envs.batches import (
 from omni_envs.envs.compiled import CompiledTask, Judged
 from omni_envs.envs.divergence import Divergence, DivergenceLog
 from omni_envs.envs.episodes import Episodes, NoiseLevel, ObjectGate
+from omni_envs.envs.learning_state import learning_state, restore_learning_state
 from omni_envs.envs.model import build_model
 from omni_envs.envs.options import autoreset_mode_of, merged_seed, refuse_unknown
 from omni_envs.envs.pictures import Pictures
@@ -222,6 +223,23 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     def noise_level(self) -> float:
         """Share of the start noise that episodes get; see ``NoiseGrowth``."""
         return self._noise.level
+
+    def learning_state(self) -> dict[str, Any]:
+        """Returns what episodes have taught the environment, as JSON-compatible data.
+
+        Failures of adaptive sampling, object gate and growth of the start noise: with them a
+        training goes on where it was. See ``omni_envs.envs.learning_state``.
+        """
+        return learning_state(self.sampler, self._gate, self._noise)
+
+    def restore_learning_state(self, state: Options) -> None:
+        """Takes over what ``learning_state`` returned; a ``reset`` with a seed forgets it again.
+
+        Raises:
+            InvalidDataError: It is of an environment with other references or options.
+        """
+        restore_learning_state(state, self.sampler, self._gate, self._noise)
+        self._task.noise_share = self._noise.observed
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: Options | None = None

@@ -45,7 +45,11 @@ class MotionSampler:
 
     def reset(self) -> None:
         """Forgets all failures."""
-        self.failures = np.zeros(len(self.bin_motion))
+        self.restore(np.zeros(len(self.bin_motion)))
+
+    def restore(self, failures: np.ndarray) -> None:
+        """Goes on from the (bins,) failure averages of another sampler of these motions."""
+        self.failures = failures
         self._cumulative: np.ndarray | None = None
 
     @property

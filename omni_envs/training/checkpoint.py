@@ -19,7 +19,9 @@ except ImportError as error:
 
 FOLDER = "checkpoints"
 _NAME = re.compile(r"step_(\d+)\.pt")
-_FORMAT = 1
+_FORMAT = 2
+_READ = (1, 2)
+"""Formats that are read; 1 had no state of the environment."""
 
 
 @dataclass
@@ -34,6 +36,8 @@ class Checkpoint:
         policy: Weights and observation statistics.
         optimizer: State of the optimiser.
         rng: State of torch's random generator.
+        environment: What episodes have taught the environment; see ``environment.learning_state``.
+            None in a file of format 1, and where the environment does not learn.
         device_rng: State of the GPU's random generator, or None for training on the CPU.
         history: One row of figures per update.
         episodes: Return and length of the episodes that finished last, which the means in
@@ -49,6 +53,7 @@ class Checkpoint:
     rng: Tensor
     history: list[dict[str, float]] = field(default_factory=list)
     episodes: list[tuple[float, float]] = field(default_factory=list)
+    environment: dict[str, Any] | None = None
     device_rng: Tensor | None = None
 
     def save(self, run: Path) -> Path:
@@ -77,8 +82,9 @@ class Checkpoint:
         except (RuntimeError, OSError, EOFError, pickle.UnpicklingError, ValueError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise FileFormatError(path, "content", "a whole checkpoint", reason) from error
-        if not isinstance(data, dict) or data.pop("format", None) != _FORMAT:
-            raise FileFormatError(path, "format", f"version {_FORMAT}", "another one")
+        if not isinstance(data, dict) or data.pop("format", None) not in _READ:
+            versions = " or ".join(map(str, _READ))
+            raise FileFormatError(path, "format", f"version {versions}", "another one")
         try:
             return cls(**data)
         except TypeError as error:

@@ -19,6 +19,7 @@ except ImportError as error:
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.device import device_rng, restore_rng, torch_device
+from omni_envs.training.environment import learning_state, restore_learning_state
 from omni_envs.training.learner import History
 from omni_envs.training.ppo import TrackingPPO
 from omni_envs.training.rollout import BODY_ERROR
@@ -76,6 +77,7 @@ class SB3Learner:
             device_rng=device_rng(self._device),
             history=history,
             episodes=[(float(e["r"]), float(e["l"])) for e in ppo.ep_info_buffer or ()],
+            environment=learning_state(self._env),
         )
 
     def restore(self, state: Checkpoint) -> None:
@@ -90,6 +92,9 @@ class SB3Learner:
         ppo.ep_success_buffer = deque(maxlen=window)
         seed = (self._seed + state.steps) % 2**31
         ppo.env.seed(seed)
+        ppo.env.reset()
+        restore_learning_state(self._env, state.environment)
+        ppo._last_obs = None  # SB3 then starts all episodes anew, in what was restored
         restore_rng(self._device, state.rng, state.device_rng, seed)
 
     def close(self) -> None:

@@ -22,6 +22,7 @@ except ImportError as error:
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.device import device_rng, restore_rng, torch_device
+from omni_envs.training.environment import learning_state, restore_learning_state
 from omni_envs.training.learner import History
 from omni_envs.training.rollout import BODY_ERROR
 from omni_envs.training.torch_threads import torch_threads
@@ -110,6 +111,7 @@ class TorchRLLearner:
             device_rng=device_rng(self._device),
             history=history,
             episodes=list(self._episodes),
+            environment=learning_state(self._vector),
         )
 
     def restore(self, state: Checkpoint) -> None:
@@ -120,7 +122,8 @@ class TorchRLLearner:
         self._steps = state.steps
         self._episodes.extend(state.episodes)
         seed = (self._config.seed + state.steps) % 2**31
-        self._env.set_seed(seed)
+        self._env.set_seed(seed)  # resets with it; what starts the episodes is a further reset
+        restore_learning_state(self._vector, state.environment)
         restore_rng(self._device, state.rng, state.device_rng, seed)
 
     def close(self) -> None:
