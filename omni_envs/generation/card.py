@@ -118,7 +118,8 @@ def _previews(out: Path, done: list[dict[str, Any]], most: int) -> list[str]:
         path = out / PREVIEWS / (row["name"].replace("/", "_") + ".png")
         try:
             if not path.is_file() or path.stat().st_mtime < (out / row["file"]).stat().st_mtime:
-                reference_strip(Reference.load(out / row["file"]), path, pictures=6, columns=6)
+                reference = Reference.load(out / row["file"])
+                reference_strip(reference, path, pictures=6, columns=6, colours=256)
         except (MissingDependencyError, RenderingError) as error:
             return [*lines, f"*No previews: {error}*", ""]
         lines += [row["name"], "", f"![{row['name']}]({path.relative_to(out).as_posix()})", ""]

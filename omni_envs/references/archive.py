@@ -13,12 +13,16 @@ import numpy as np
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.errors import FileFormatError, InvalidDataError
 from omni_envs.metrics.report import ReferenceReport
+from omni_envs.references.compact import compact, complete
 from omni_envs.references.reference import Reference
 from omni_envs.robots import robot_names
 from omni_envs.scenes import Scene
 
-FORMAT = "omni_envs.reference/1"
+FORMAT = "omni_envs.reference/2"
 """Value of the array ``format``: name and version of the layout."""
+
+READABLE = ("omni_envs.reference/1", FORMAT)
+"""Formats that can be read. A file of version 1 has the velocities and all body arrays, too."""
 
 _TEXT = ("robot", "name")
 _NUMBER = ("fps", "scale")
@@ -38,7 +42,7 @@ def reference_to_arrays(reference: Reference) -> dict[str, np.ndarray]:
                     _put(arrays, f"source/{part.name}", getattr(value, part.name))
         else:
             _put(arrays, f.name, value)
-    return arrays
+    return compact(arrays)
 
 
 def reference_from_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> Reference:
@@ -51,11 +55,11 @@ def reference_from_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) ->
     Raises:
         FileFormatError: Arrays are missing, malformed or do not fit the robot.
     """
-    if str(arrays.get("format", "")) != FORMAT:
-        found = f"arrays {', '.join(sorted(arrays)[:8])}"
-        raise FileFormatError(
-            path, "format", f"{FORMAT!r} (a file written by Reference.save)", found
-        )
+    _check_format(path, arrays)
+    robot = arrays.get("robot")
+    if robot is not None and str(robot) not in robot_names():
+        raise FileFormatError(path, "robot", f"one of {robot_names()}", repr(str(robot)[:80]))
+    arrays = complete(arrays)
     report = {k.removeprefix("report/"): v for k, v in arrays.items() if k.startswith("report/")}
     try:
         values = _take(path, arrays, "", Reference, skip=("report", "source"))
@@ -64,11 +68,21 @@ def reference_from_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) ->
         values["source"] = (
             SourceMotion(**_take(path, arrays, "source/", SourceMotion)) if has_source else None
         )
-        if values["robot"] not in robot_names():
-            raise FileFormatError(path, "robot", f"one of {robot_names()}", repr(values["robot"]))
         return Reference(**values)
     except InvalidDataError as error:
         raise FileFormatError(path, error.field, "a valid reference", str(error)) from error
+
+
+def _check_format(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
+    expected = f"{' or '.join(map(repr, READABLE))} (a file written by Reference.save)"
+    if "format" not in arrays:
+        found = f"none among the arrays {', '.join(sorted(arrays)[:8])}"
+        raise FileFormatError(path, "format", expected, found)
+    found = str(arrays["format"])
+    if found not in READABLE:
+        ours = found.startswith(FORMAT.partition("/")[0] + "/")
+        hint = ", which another version of omni_envs writes" if ours else ""
+        raise FileFormatError(path, "format", expected, repr(found[:80]) + hint)
 
 
 def _put(arrays: dict[str, np.ndarray], name: str, value: Any) -> None:

@@ -33,15 +33,27 @@ def picture_strip(pictures: Sequence[np.ndarray], columns: int | None = None) ->
     return np.concatenate(rows, axis=0)
 
 
-def write_picture(path: str | Path, picture: np.ndarray) -> Path:
+def write_picture(path: str | Path, picture: np.ndarray, *, colours: int | None = None) -> Path:
     """Writes one picture; the suffix decides the format.
+
+    Args:
+        path: ``.png`` or ``.jpg``.
+        picture: (H, W, 3) uint8.
+        colours: Most colours of a ``.png``: 256 make half the file. All by default.
 
     Raises:
         InvalidOptionError: The suffix is not one of ``PICTURE_SUFFIXES``.
         MissingDependencyError: imageio is not installed.
     """
     path = _checked(path, PICTURE_SUFFIXES, "picture")
-    _imageio().imwrite(path, picture)
+    imageio = _imageio()
+    if colours is None or path.suffix.lower() != ".png":
+        imageio.imwrite(path, picture)
+    else:
+        from PIL import Image  # imageio brings it
+
+        chosen = Image.fromarray(picture).quantize(colours, dither=Image.Dither.NONE)
+        chosen.save(path, optimize=True)
     return path
 
 

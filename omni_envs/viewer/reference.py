@@ -57,16 +57,28 @@ def reference_frames(
 
 
 def reference_strip(
-    reference: Reference, path: str | Path, *, pictures: int = 12, columns: int = 6
+    reference: Reference,
+    path: str | Path,
+    *,
+    pictures: int = 12,
+    columns: int = 6,
+    colours: int | None = None,
 ) -> Path:
     """Writes evenly spaced frames of a reference as one picture.
+
+    Args:
+        reference: What to show.
+        path: ``.png`` or ``.jpg``.
+        pictures: How many frames.
+        columns: How many in a row.
+        colours: Most colours of a ``.png``, all by default.
 
     Returns:
         The path.
     """
     indices = np.linspace(0, len(reference.qpos) - 1, pictures).round().astype(int)
     frames = list(reference_frames(reference, indices, width=360, height=400))
-    return write_picture(path, picture_strip(frames, columns))
+    return write_picture(path, picture_strip(frames, columns), colours=colours)
 
 
 def reference_video(reference: Reference, path: str | Path, *, every: int = 2) -> Path:

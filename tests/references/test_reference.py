@@ -116,6 +116,7 @@ def test_a_file_without_an_array_is_refused(file, missing):
         ("body_positions", np.zeros(3)),
         ("body_names", np.array(1.0)),
         ("object_poses", np.array(["a"] * 40)),
+        ("qvel", np.array(0.0)),
         ("format", np.array("another/1")),
         ("stance", np.array(True)),
         ("contacts/tail", np.ones(40, bool)),

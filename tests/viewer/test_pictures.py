@@ -20,6 +20,18 @@ def test_picture_round_trip(tmp_path):
     np.testing.assert_array_equal(imageio.imread(path), PICTURES[1])
 
 
+def test_fewer_colours_make_a_smaller_file_of_nearly_the_same_picture(tmp_path):
+    x, y = np.meshgrid(np.linspace(0, 1, 120), np.linspace(0, 1, 80))
+    smooth = 250 * np.stack([x, y, 0.5 + 0.4 * np.sin(9 * x * y)], axis=-1)
+    picture = (smooth + np.random.default_rng(0).integers(0, 4, smooth.shape)).astype(np.uint8)
+    whole = write_picture(tmp_path / "whole.png", picture)
+    small = write_picture(tmp_path / "small.png", picture, colours=256)
+    assert small.stat().st_size < 0.6 * whole.stat().st_size
+    found = imageio.imread(small)[..., :3].astype(float)
+    assert len(np.unique(found.reshape(-1, 3), axis=0)) <= 256
+    assert np.abs(found - picture).mean() < 8
+
+
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
 def test_video_has_every_picture(tmp_path, suffix):
     path = write_video(tmp_path / f"a{suffix}", iter(PICTURES), fps=25)
