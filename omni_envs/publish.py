@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -60,7 +59,14 @@ def publish(
     run, out = Path(run), Path(out)
     config = TrainConfig.load(run)
     state = Checkpoint.load(find_checkpoint(run))
-    config = replace(config, evaluation_episodes=episodes, steps=state.steps)
+    # The steps that it got, whatever was to end the run, and no path of this machine.
+    config = replace(
+        config,
+        out=Path("runs") / out.resolve().name,
+        steps=state.steps,
+        time_limit=0.0,
+        evaluation_episodes=episodes,
+    )
     evaluation = evaluate_run(run, episodes=episodes, progress=progress)
     if evaluation.success_rate < least:
         raise InvalidOptionError(
@@ -69,7 +75,7 @@ def publish(
         )
     shutil.rmtree(out / FOLDER, ignore_errors=True)
     out.mkdir(parents=True, exist_ok=True)
-    replace(config, out=out).save()
+    config.save(out)
     # What going on would need is left out, above all the optimiser's moments.
     slim = replace(state, optimizer={}, rng=state.rng[:0], history=[], episodes=[])
     slim = replace(slim, environment=None, device_rng=None)
@@ -79,7 +85,7 @@ def publish(
     write_history(out, _thinned(history))
     if state.history:
         plot_curve(out, history, _control_step(config))
-    exported = export_run(out)
+    exported = export_run(out, origin=config.out)
     steps, fell = _strip(config, Path(exported["path"]), out / STRIP)
     _write_card(out, config, state, evaluation, f"{steps} control steps" + (", a fall" * fell))
     return {**asdict(evaluation), **exported, "card": str(out / CARD)}
@@ -113,6 +119,11 @@ def _strip(config: TrainConfig, file: Path, path: Path) -> tuple[int, bool]:
     return seen.steps, seen.terminated
 
 
+def _time(seconds: float) -> str:
+    """Returns a duration in words."""
+    return f"{seconds / 3600:.1f} hours" if seconds >= 5400 else f"{seconds / 60:.0f} minutes"
+
+
 def _write_card(
     out: Path, config: TrainConfig, state: Checkpoint, evaluation: Evaluation, episode: str
 ) -> None:
@@ -134,17 +145,19 @@ def _write_card(
         text = "success with the object always within 25 cm of its reference"
         rows.insert(1, (text, f"{evaluation.carried_rate:.1%}"))
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
-    hours, cores = state.seconds / 3600, config.num_threads or os.cpu_count()
-    command = replace(config, out=Path("runs") / out.name).command()
+    million = f"{state.steps / 1e6:.{1 if state.steps >= 1e6 else 3}f} million"
+    trained = f"{million} control steps in {_time(state.seconds)}"
+    if state.machines:
+        trained += f" on {', then '.join(state.machines)}"
+    trainer = {"sb3": "Stable-Baselines3", "torchrl": "TorchRL"}[config.trainer]
     curve = "\n![Learning curve](curve.png)\n" if (out / "curve.png").is_file() else ""
     card = f"""# {out.name}
 
 ![A randomized episode, the reference as a ghost]({STRIP})
 
-A policy for `{config.env}`: {state.steps / 1e6:.1f} million control steps of training in
-{hours:.1f} hours on {cores} CPU cores. An episode is a success when it hits no termination
-criterion of the task, with everything randomized that the task randomizes. The picture shows one
-episode: {episode}.
+A policy for `{config.env}`, trained with {trainer} for {trained}.
+An episode is a success when it hits no termination criterion of the task, with everything
+randomized that the task randomizes. The picture shows one episode: {episode}.
 
 | figure | value |
 |---|---|
@@ -164,7 +177,7 @@ take it.
 ## Trained with
 
 ```console
-$ {command}
+$ {config.command()}
 ```
 
 ## Licence

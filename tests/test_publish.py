@@ -19,6 +19,7 @@ from omni_envs.publish import CARD, STRIP, publish
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.evaluate import evaluate_run
 from omni_envs.training.network_policy import find_checkpoint, load_actor
+from omni_envs.training.onnx_policy import OnnxPolicy
 from omni_envs.training.recipes import RECIPES
 from omni_envs.training.run import train
 
@@ -61,8 +62,20 @@ def test_the_folder_holds_what_a_policy_needs(folder):
     config = TrainConfig.load(folder)
     assert config.steps == 64  # those that it got, whatever was asked for
     assert replace(config, out=Path("runs/sway")).command() in card and "Apache-2.0" in card
+    assert "64 million" not in card and "0.000 million control steps in 0 minutes" in card
+    assert f"{config.num_threads} CPU core" in card
     with (folder / "curve.csv").open() as file:
         assert float(list(csv.DictReader(file))[-1]["steps"]) == 64
+
+
+def test_the_folder_is_small_and_names_no_path_of_this_machine(run, folder):
+    assert sum(p.stat().st_size for p in folder.rglob("*") if p.is_file()) < 5e6
+    reference = TrainConfig.load(run).env_options["reference"]  # the user's own, to be kept
+    for name in ("config.json", "policy.json", CARD):
+        text = (folder / name).read_text().replace(json.dumps(reference)[1:-1], "")
+        assert str(folder.parent) not in text and str(run.parent) not in text, name
+    assert OnnxPolicy(folder / "policy.onnx").metadata["run_path"] == "runs/sway"
+    assert json.loads((folder / "policy.json").read_text())["training"]["out"] == "runs/sway"
 
 
 def test_the_folder_is_a_run_without_the_optimiser(run, folder):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,11 @@ PROFILES = ("beyondmimic",)
 
 
 def export_run(
-    run: str | Path, *, profile: str = "beyondmimic", out: str | Path | None = None
+    run: str | Path,
+    *,
+    profile: str = "beyondmimic",
+    out: str | Path | None = None,
+    origin: str | Path | None = None,
 ) -> dict[str, Any]:
     """Exports the newest checkpoint of a run, with a sidecar ``.json`` beside the file.
 
@@ -24,6 +29,7 @@ def export_run(
         run: Run directory.
         profile: Convention of the file.
         out: The file, by default ``RUN/policy.onnx``.
+        origin: Where the file says that it comes from, by default the run directory.
 
     Returns:
         ``path``, ``sidecar``, ``parity_max_abs``, ``closed_loop_return``,
@@ -48,6 +54,8 @@ def export_run(
 
     run = Path(run)
     config = TrainConfig.load(run)
+    if origin is not None:
+        config = replace(config, out=Path(origin))
     checkpoint = find_checkpoint(run)
     steps = Checkpoint.load(checkpoint).steps
     path = Path(out) if out is not None else run / "policy.onnx"
@@ -58,7 +66,7 @@ def export_run(
         env.close()
     actor = load_actor(checkpoint)
     graph = BeyondMimicGraph(actor, description)
-    write_beyondmimic(graph, path, description.metadata(str(run)))
+    write_beyondmimic(graph, path, description.metadata(str(config.out)))
     try:
         file = OnnxPolicy(path)
         loop = closed_loop(config, NetworkPolicy(actor), file)

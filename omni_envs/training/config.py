@@ -159,42 +159,44 @@ class TrainConfig:
 
     def command(self) -> str:
         """Returns the command that repeats this run: a recipe, and what differs from it."""
-        from omni_envs.training.recipes import RECIPES
-
-        data = self.to_dict()
         flags: dict[str, Any] = {
             "env": self.env,
             "trainer": self.trainer,
             "steps": self.steps,
             "time-limit": self.time_limit,
-            "num-envs": self.num_envs,
             "seed": self.seed,
             "device": self.device,
             "episodes": self.evaluation_episodes,
-            "env-options": json.dumps(data["env_options"]),
-            "training-options": json.dumps(data["training_options"]),
-            "ppo": json.dumps(data["ppo"]),
             "out": self.out,
         }
-        name = "published"
-        for known, recipe in RECIPES.items():
-            more: dict[str, Any] = {
-                "trainer": self.trainer,
-                "seed": self.seed,
-                "time_limit": self.time_limit,
-            }
-            same = recipe.config(self.env, self.out, self.steps, **more).to_dict()
-            if all(same[key] == data[key] for key in _OF_A_RECIPE):
-                name = known
-                for key in _OF_A_RECIPE:
-                    del flags[key.replace("_", "-")]
-                break
+        recipe, changes = self._recipe()
+        for name, value in changes.items():
+            text = value if name == "num_envs" else json.dumps(value)
+            flags[name.replace("_", "-")] = text
         words = [word for flag, value in flags.items() for word in (f"--{flag}", str(value))]
-        return shlex.join(["python", "train.py", "--recipe", name, *words])
+        return shlex.join(["python", "train.py", "--recipe", recipe, *words])
 
-    def save(self) -> Path:
-        """Writes ``config.json`` into the run directory."""
-        path = self.out / CONFIG_FILE
+    def _recipe(self) -> tuple[str, dict[str, Any]]:
+        """Returns the recipe from which the fewest words lead here, and the changes to it."""
+        from omni_envs.training.recipes import RECIPES
+
+        data = self.to_dict()
+        ways = []
+        for name, recipe in RECIPES.items():
+            base = recipe.config(self.env, self.out, self.steps).to_dict()
+            changes = {key: data[key] for key in _OF_A_RECIPE if data[key] != base[key]}
+            if "ppo" in changes:
+                ppo = data["ppo"].items()
+                changes["ppo"] = {k: value for k, value in ppo if value != base["ppo"][k]}
+            again = recipe.config(self.env, self.out, self.steps, **changes).to_dict()
+            # Options are laid over a recipe's: what it has and this run has not cannot be undone.
+            exact = all(again[key] == data[key] for key in _OF_A_RECIPE)
+            ways.append((not exact, len(json.dumps(changes)), name, changes))
+        return min(ways, key=lambda way: way[:2])[2:]
+
+    def save(self, run: Path | None = None) -> Path:
+        """Writes ``config.json`` into a run directory, by default its own."""
+        path = (self.out if run is None else run) / CONFIG_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(self.to_dict(), indent=2) + "\n")
         return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
@@ -27,6 +28,14 @@ def torch_device(name: str) -> torch.device:
         return torch.device("cpu")
     # With its number, as tensors name it: libraries compare devices, and "cuda" is not "cuda:0".
     return torch.device("cuda", torch.cuda.current_device())
+
+
+def machine(device: torch.device, threads: int = 0) -> str:
+    """Returns what trains, in words: the physics threads (0: every core), and the GPU if any."""
+    affinity = getattr(os, "sched_getaffinity", None)  # not on every system
+    cores = threads or (len(affinity(0)) if affinity else os.cpu_count() or 1)
+    words = f"{cores} CPU core{'s' * (cores > 1)}"
+    return f"{words}, {torch.cuda.get_device_name(device)}" if device.type == "cuda" else words
 
 
 def second_worker(device: torch.device) -> Executor:

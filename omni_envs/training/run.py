@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gymnasium.vector import VectorEnv
@@ -19,7 +19,7 @@ except ImportError as error:
 from omni_envs.training.checkpoint import Checkpoint, checkpoints, keep_newest
 from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.curve import write_history
-from omni_envs.training.device import torch_device
+from omni_envs.training.device import machine, torch_device
 from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.environment import make_env
 from omni_envs.training.learner import History, Learner, autoreset_mode, make_learner
@@ -114,6 +114,8 @@ def _train(
     else:
         state.save(config.out)
     history, before, begin = state.history, state.seconds, time.perf_counter()
+    here = machine(torch_device(config.device), config.num_threads)
+    machines = [*(name for name in state.machines if name != here), here]
     seconds, saved = before, learner.steps
     show = sys.stderr.isatty() if progress is None else progress
     with (
@@ -136,14 +138,16 @@ def _train(
                 if name != "steps":
                     board.add_scalar(f"training/{name}", value, learner.steps)
             if len(history) % config.checkpoint_every == 0:
-                saved = _save(config.out, learner, seconds, history)
+                saved = _save(config.out, learner, seconds, history, machines)
     if saved != learner.steps:
-        _save(config.out, learner, seconds, history)
+        _save(config.out, learner, seconds, history, machines)
     return RunResult(config.out, learner.steps, seconds, control_dt, tuple(history))
 
 
-def _save(run: Path, learner: Learner, seconds: float, history: History) -> int:
-    learner.state(seconds, history).save(run)
+def _save(
+    run: Path, learner: Learner, seconds: float, history: History, machines: list[str]
+) -> int:
+    replace(learner.state(seconds, history), machines=machines).save(run)
     keep_newest(run, KEEP_CHECKPOINTS)
     write_history(run, history)
     return learner.steps

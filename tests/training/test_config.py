@@ -4,6 +4,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+import tyro
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.config import PPOConfig, TrainConfig, merged
@@ -57,6 +58,7 @@ def test_a_run_directory_may_be_moved(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"device": "tpu"}, "device must be 'auto', 'cpu' or 'cuda'; got 'tpu'"),
         ({"stesp": 3}, r"unknown \['stesp'\]. Valid: .*steps"),
         ({"ppo": {"gama": 0.9}}, r"TrainConfig.ppo: unknown \['gama'\]"),
         ({"steps": 0}, "steps must be positive; got 0"),
@@ -82,7 +84,28 @@ def test_the_command_is_the_shortest_that_repeats_the_run(tmp_path, recipe):
     changed = RECIPES[recipe].config("X", tmp_path, 7, num_envs=5)
     words = shlex.split(changed.command())
     assert words[words.index("--num-envs") + 1] == "5"
-    assert json.loads(words[words.index("--ppo") + 1]) == changed.to_dict()["ppo"]
+    assert "--ppo" not in words and words[words.index("--recipe") + 1] == recipe
+    changed = RECIPES[recipe].config("X", tmp_path, 7, ppo={"gamma": 0.5}, device="auto")
+    words = shlex.split(changed.command())
+    assert json.loads(words[words.index("--ppo") + 1]) == {"gamma": 0.5}
+    assert words[words.index("--device") + 1] == "auto" and "--env-options" not in words
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"num_envs": 3, "ppo": {"hidden": [8, 8], "clip": 0.3}},
+        {"env_options": {"preset": "beyondmimic", "reset": {"start": "start"}}},
+        {"training_options": {"observation": {"privileged": False}, "physics": "fast"}},
+    ],
+)
+def test_the_command_repeats_a_changed_recipe(tmp_path, recipe, changes):
+    from train import Arguments, make_config
+
+    config = RECIPES[recipe].config("X", tmp_path, 7, **changes)
+    words = shlex.split(config.command())
+    assert make_config(tyro.cli(Arguments, args=words[2:])) == config
 
 
 def test_options_are_merged_field_by_field(tmp_path):
