@@ -29,6 +29,7 @@ from typing import Any, Literal
 
 from omni_envs.errors import InvalidOptionError, UnknownNameError
 from omni_envs.scenes import PhysicsOptions
+from omni_envs.tracking.limits import check_limits
 from omni_envs.tracking.options import override
 
 Vector3 = tuple[float, float, float]
@@ -406,7 +407,7 @@ def make_config(
 
     Raises:
         UnknownNameError: A preset or field that does not exist.
-        InvalidOptionError: A value of the wrong type or size.
+        InvalidOptionError: A value of the wrong type or size, or outside its limits.
     """
     if preset not in PRESETS:
         raise UnknownNameError("preset", preset, PRESETS)
@@ -416,4 +417,6 @@ def make_config(
         if physics not in PHYSICS_PRESETS:
             raise UnknownNameError("physics preset", physics, PHYSICS_PRESETS)
         given["physics"] = PHYSICS_PRESETS[physics]
-    return override(override(PRESETS[preset], task, "task"), given, "environment")
+    config = override(override(PRESETS[preset], task, "task"), given, "environment")
+    check_limits(config)
+    return config

@@ -145,11 +145,13 @@ class MotionLibrary:
         """
         motions = np.broadcast_to(np.asarray(0 if motion is None else motion), count)
         places = np.broadcast_to(np.asarray(0 if frame is None else frame), count)
-        inside = np.isin(motions, np.arange(self.num_motions)).all()
+        whole = all(np.issubdtype(a.dtype, np.integer) for a in (motions, places))
+        inside = whole and np.isin(motions, np.arange(self.num_motions)).all()
         if not inside or not ((places >= 0) & (places <= self.lengths[motions] - 2)).all():
             raise InvalidOptionError(
                 f"reset: motion must be below {self.num_motions} and frame from 0 to the last but "
-                f"one of the motion; the motions have {self.lengths.tolist()} frames."
+                "one of the motion, whole numbers; the motions have "
+                f"{self.lengths.tolist()} frames."
             )
         return motions, places
 

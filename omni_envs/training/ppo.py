@@ -72,6 +72,8 @@ class TrackingPPO(PPO):
         config: Hyper-parameters.
         seed: Seed of network, exploration and environment.
         device: Where the network lives and learns.
+        policy: As SB3's ``load`` gives it back: always ``TrackingPolicy``.
+        _init_setup_model: False while ``load`` builds it.
 
     Attributes:
         current_learning_rate: Learning rate of the next gradient step.
@@ -88,15 +90,19 @@ class TrackingPPO(PPO):
         config: PPOConfig | None = None,
         seed: int | None = None,
         device: torch.device | str = "cpu",
+        *,
+        policy: type[TrackingPolicy] = TrackingPolicy,
+        _init_setup_model: bool = True,
     ) -> None:
         config = config or PPOConfig()
         self.config = config
+        num_envs = 1 if env is None else env.num_envs  # a model may be loaded without one
         super().__init__(
-            TrackingPolicy,
+            policy,
             env,
             learning_rate=config.learning_rate,
             n_steps=config.rollout_steps,
-            batch_size=max(2, config.rollout_steps * env.num_envs // config.minibatches),
+            batch_size=max(2, config.rollout_steps * num_envs // config.minibatches),
             n_epochs=config.epochs,
             gamma=config.gamma,
             gae_lambda=config.gae_lambda,
@@ -112,13 +118,17 @@ class TrackingPPO(PPO):
             },
             seed=seed,
             device=device,
-            stats_window_size=max(100, env.num_envs),
+            stats_window_size=max(100, num_envs),
+            _init_setup_model=_init_setup_model,
         )
-        if config.critic_learning_rate:
-            self._split_optimizer(config.critic_learning_rate)
         self.set_logger(Logger(None, []))
         self.current_learning_rate = config.learning_rate
         self.figures: dict[str, float] = {}
+
+    def _setup_model(self) -> None:
+        super()._setup_model()
+        if self.config.critic_learning_rate:
+            self._split_optimizer(self.config.critic_learning_rate)
 
     def collect_rollouts(self, *args: Any, **kwargs: Any) -> bool:
         """Collects a rollout with one thread for the network: the cores belong to the physics."""

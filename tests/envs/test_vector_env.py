@@ -349,6 +349,8 @@ def test_several_motions(make, sway, reference):
     assert infos["motion"].tolist() == [1] * 60
     with pytest.raises(InvalidOptionError, match="frame from 0 to the last but one"):
         env.reset(options={"motion": 1, "frame": 59})
+    with pytest.raises(InvalidOptionError, match="whole numbers"):
+        env.reset(options={"frame": 1.5})
     with pytest.raises(InvalidOptionError, match="motion must be below 2"):
         env.reset(options={"motion": 2})
 

@@ -193,3 +193,22 @@ def test_same_seed_same_weights(chase):
         learner.learn(3 * 16 * 32)
         weights.append(learner.policy.action_net.weight.clone())
     assert torch.equal(*weights)
+
+
+@pytest.mark.parametrize("critic", [0.0, 2e-3])
+def test_sb3s_save_and_load(chase, tmp_path, critic):
+    learner = _learner(chase, replace(SMALL, critic_learning_rate=critic))
+    learner.learn(3 * 16 * 32)
+    learner.save(tmp_path / "model.zip")
+    seen = {"policy": np.ones((5, 2), np.float32), "critic": np.ones((5, 4), np.float32)}
+    expected, _ = learner.predict(seen, deterministic=True)
+    alone = TrackingPPO.load(tmp_path / "model.zip")
+    np.testing.assert_array_equal(alone.predict(seen, deterministic=True)[0], expected)
+    again = TrackingPPO.load(tmp_path / "model.zip", env=learner.get_env())
+    assert again.config == learner.config
+    assert again.current_learning_rate == learner.current_learning_rate
+    groups = [group["lr"] for group in again.policy.optimizer.param_groups]
+    assert groups == [group["lr"] for group in learner.policy.optimizer.param_groups]
+    again.learn(2 * 16 * 32)
+    assert again.figures["kl"] > 0
+    assert not np.array_equal(again.predict(seen, deterministic=True)[0], expected)
