@@ -6,6 +6,7 @@ import json
 import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
+from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
@@ -64,13 +65,22 @@ class PPOConfig:
     initial_std: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("rollout_steps", "epochs", "minibatches", "learning_rate", "initial_std"):
+        for name in ("rollout_steps", "epochs", "minibatches"):
+            _within(
+                "PPOConfig", name, getattr(self, name), "a whole number from 1 on", 1, whole=True
+            )
+        for name in ("learning_rate", "initial_std", "clip", "max_grad_norm"):
             _positive("PPOConfig", name, getattr(self, name))
+        for name in _FROM_ZERO:
+            _within("PPOConfig", name, getattr(self, name), "0 or more", 0.0)
+        for name in ("gamma", "gae_lambda"):
+            _within("PPOConfig", name, getattr(self, name), "from 0 to 1", 0.0, 1.0)
         if self.adapt_every not in ("minibatch", "update"):
             raise InvalidOptionError(
                 f"PPOConfig: adapt_every must be 'minibatch' or 'update'; got {self.adapt_every!r}."
             )
-        if not self.hidden or any(width < 1 for width in self.hidden):
+        widths = self.hidden
+        if not isinstance(widths, tuple) or not widths or any(not _whole(w, 1) for w in widths):
             raise InvalidOptionError(f"PPOConfig: hidden must be widths ≥ 1; got {self.hidden}.")
 
 
@@ -116,6 +126,8 @@ class TrainConfig:
     def __post_init__(self) -> None:
         for name in ("steps", "num_envs", "checkpoint_every", "evaluation_episodes"):
             _positive("TrainConfig", name, getattr(self, name))
+        for name in ("num_threads", "seed", "time_limit"):
+            _within("TrainConfig", name, getattr(self, name), "0 or more", 0.0)
         if self.trainer not in TRAINERS:
             raise InvalidOptionError(
                 f"TrainConfig: trainer must be 'sb3' or 'torchrl'; got {self.trainer!r}."
@@ -151,7 +163,8 @@ class TrainConfig:
         ppo = dict(data.get("ppo", {}))
         _known("TrainConfig.ppo", ppo, PPOConfig)
         if "hidden" in ppo:
-            ppo["hidden"] = tuple(ppo["hidden"])
+            widths = ppo["hidden"]
+            ppo["hidden"] = tuple(widths) if isinstance(widths, list | tuple) else widths
         try:
             return cls(**{**data, "ppo": PPOConfig(**ppo)})
         except TypeError as error:
@@ -218,6 +231,9 @@ class TrainConfig:
             raise FileFormatError(path, "content", "a TrainConfig as JSON", str(error)) from error
 
 
+_FROM_ZERO = (
+    "critic_learning_rate", "desired_kl", "value_clip", "value_weight", "entropy_weight",
+)  # fmt: skip
 _OF_A_RECIPE = ("num_envs", "env_options", "training_options", "ppo")
 
 
@@ -231,9 +247,31 @@ def merged(options: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     return result
 
 
-def _positive(owner: str, name: str, value: float) -> None:
-    if not value > 0:
-        raise InvalidOptionError(f"{owner}: {name} must be positive; got {value}.")
+def _positive(owner: str, name: str, value: Any) -> None:
+    if not _number(value) or not 0 < value < inf:
+        raise InvalidOptionError(f"{owner}: {name} must be positive; got {value!r}.")
+
+
+def _within(
+    owner: str,
+    name: str,
+    value: Any,
+    words: str,
+    low: float,
+    high: float = inf,
+    whole: bool = False,
+) -> None:
+    good = _whole(value, low) if whole else _number(value) and low <= value <= high
+    if not good or value == inf:
+        raise InvalidOptionError(f"{owner}: {name} must be {words}; got {value!r}.")
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _whole(value: Any, low: float) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and value >= low
 
 
 def _known(owner: str, data: Mapping[str, Any], cls: type) -> None:
