@@ -20,9 +20,10 @@ from omni_envs.demonstrations.conventions import (
 )
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.floor import level_floor
+from omni_envs.demonstrations.footing import stand_on_ground
 from omni_envs.demonstrations.namings import recognise, skeleton_map, skeleton_names
 from omni_envs.demonstrations.resampling import FPS, resample_positions
-from omni_envs.demonstrations.skeleton_map import SkeletonMap
+from omni_envs.demonstrations.skeleton_map import SkeletonMap, joints_below
 from omni_envs.demonstrations.source_options import METRES, SourceOptions, Unit, UpAxis
 from omni_envs.errors import FileFormatError, InvalidDataError
 from omni_envs.robots import KEYPOINTS, SIDES
@@ -158,7 +159,7 @@ def to_demonstration(
     """Turns a recording into a demonstration at 30 fps, z up, in metres.
 
     Where there is neither terrain nor object, a slight tilt of the recorded ground is taken out,
-    and the ground is put where the lowest toe of the clip is.
+    and feet that stand are put on the ground.
 
     Args:
         recording: The recording.
@@ -183,9 +184,13 @@ def to_demonstration(
     check_sides(path, keypoints)
     parts: tuple[Part, ...] = () if terrain_mesh is None else load_convex_parts(terrain_mesh)
     if terrain_mesh is None and object_poses is None:
-        toes = [recording.joint_names.index(joints.keypoints[f"{side}_toe"]) for side in SIDES]
+        toes, knees = (
+            [recording.joint_names.index(joints.keypoints[f"{side}_{part}"]) for side in SIDES]
+            for part in ("toe", "knee")
+        )
+        feet = [_foot(recording, joints, side) for side in SIDES]
         positions = level_floor(positions, positions[:, toes], FPS)
-        positions[..., 2] -= positions[:, toes, 2].min()
+        positions = stand_on_ground(positions, positions[:, toes], positions[:, knees], feet, FPS)
     if scene is None:
         scene = Scene(terrain=Terrain(parts) if parts else None)
     try:
@@ -209,6 +214,13 @@ def to_demonstration(
 def _indices(recording: Recording, joints: SkeletonMap) -> list[int]:
     joints.fit(recording.path, recording.joint_names)
     return [recording.joint_names.index(joints.keypoints[k]) for k in KEYPOINTS]
+
+
+def _foot(recording: Recording, joints: SkeletonMap, side: str) -> list[int]:
+    """Indices of the joints of a foot: ankle, toe, and what else hangs on the ankle."""
+    ankle, toe = (joints.keypoints[f"{side}_{part}"] for part in ("ankle", "toe"))
+    names = {ankle, toe, *joints_below(ankle, recording.joint_names, recording.parents)}
+    return [recording.joint_names.index(name) for name in sorted(names)]
 
 
 def _check_bones(path: Path, keypoints: np.ndarray) -> None:

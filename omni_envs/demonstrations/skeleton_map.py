@@ -82,7 +82,7 @@ class SkeletonMap:
         contacts = dict(self.contacts)
         for side in SIDES:
             hand = self.keypoints[f"{side}_hand"]
-            contacts.setdefault(f"{side}_hand", (hand, *_below(hand, joint_names, parents)))
+            contacts.setdefault(f"{side}_hand", (hand, *joints_below(hand, joint_names, parents)))
             contacts.setdefault(f"{side}_foot", (self.keypoints[f"{side}_toe"],))
             contacts.setdefault(f"{side}_knee", (self.keypoints[f"{side}_knee"],))
         return Skeleton(self.name, tuple(joint_names), self.keypoints, contacts)
@@ -152,9 +152,16 @@ def read_skeleton_map(path: str | Path) -> SkeletonMap:
         raise FileFormatError(path, error.field, "a valid skeleton map", str(error)) from error
 
 
-def _below(
+def joints_below(
     joint: str, joint_names: Sequence[str], parents: Sequence[int] | None
 ) -> tuple[str, ...]:
+    """Joints that hang on a joint, parents before their children; none where parents are unknown.
+
+    Args:
+        joint: Name of the joint.
+        joint_names: All J joints, parents first.
+        parents: (J,) index of every joint's parent, −1 for the root.
+    """
     if parents is None:
         return ()
     inside = {list(joint_names).index(joint)}

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from omni_envs.demonstrations.contact import KNEE_RADIUS, object_contacts, terrain_contacts
+from omni_envs.demonstrations.contact import object_contacts, terrain_contacts
 from omni_envs.demonstrations.demonstration import Demonstration
+from omni_envs.demonstrations.footing import knee_floor
 from omni_envs.demonstrations.stance import STANCE_MODES, stance_schedule
 from omni_envs.errors import InvalidOptionError
 from omni_envs.robots import KEYPOINTS
@@ -16,8 +17,6 @@ from omni_envs.scenes import Scene
 
 MAT_HEIGHT = 0.1
 """Toes that never come lower than this stand on a mat of this height, m (human scale)."""
-
-_STRAY = 1 / 3  # s for which knees may be deeper than the floor allows
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +73,7 @@ def scale_demonstration(demonstration: Demonstration, robot_height: float) -> So
 
     * joints: lowered so that the lowest toe joint of the clip is at z = 0 (less a 0.1 m mat when no
       toe comes below 0.1 m), then × α. The toe joint of the human becomes the sole of the robot.
-      Someone who crawls may never put a toe flat: knees come no lower than their radius, but for
-      a third of a second in all, which a stray frame may take.
+      Someone who crawls may never put a toe flat: ``knee_floor`` counts too.
     * terrain × α, not lowered: what counts is that the toes meet the surface. Keypoints, stance and
       contact all use the same lowered joints.
     * object: size kept; x, y × α; the height of the first frame is kept and only its changes are
@@ -98,9 +96,7 @@ def scale_demonstration(demonstration: Demonstration, robot_height: float) -> So
     if floor >= MAT_HEIGHT:
         floor -= MAT_HEIGHT
     knees = [KEYPOINTS.index("left_knee"), KEYPOINTS.index("right_knee")]
-    lower = np.sort(demonstration.keypoints[:, knees, 2].min(axis=1))
-    stray = min(round(_STRAY * demonstration.fps), len(lower) // 10)
-    floor = min(floor, lower[stray] - KNEE_RADIUS)
+    floor = min(floor, knee_floor(demonstration.keypoints[:, knees], demonstration.fps))
     offset = np.array([0.0, 0.0, floor])
     keypoints = scale * (demonstration.keypoints - offset)
     scene, poses = demonstration.scene, demonstration.object_poses
