@@ -16,8 +16,8 @@ from omni_envs.scenes import OBJECT, Box, SceneObject
 from omni_envs.tracking.config import ObjectRandomization, RandomizationConfig
 from omni_envs.tracking.randomization import scaled_inertia, symmetric
 
-SEED = 20260101
-"""Variants are the same in every environment; which one an episode gets comes from its own seed."""
+_SEED = 20260101
+"""Added to the seed of the option: variants do not depend on the environment's own seed."""
 
 
 class ModelVariants:
@@ -93,7 +93,7 @@ def _draw(
     objects = config.object if scene_object is not None else None
     if not (config.torso_centre_of_mass or config.friction or objects):
         return [model]
-    rng, data = np.random.default_rng(SEED), mujoco.MjData(model)
+    rng, data = np.random.default_rng(_SEED + config.seed), mujoco.MjData(model)
     meshes = _has_meshes(scene_object)
     variants = []
     for _ in range(config.variants):

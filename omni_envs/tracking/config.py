@@ -198,6 +198,8 @@ class RandomizationConfig:
         push: Random pushes.
         object: Object properties.
         variants: Number of randomized models that episodes draw from.
+        seed: Of these models, apart from the environment's own: environments with the same seed
+            draw from the same ones. Policies are evaluated on others than they were trained on.
     """
 
     torso_centre_of_mass: Vector3 | None = (0.025, 0.05, 0.075)
@@ -206,6 +208,7 @@ class RandomizationConfig:
     push: PushConfig | None = PushConfig()
     object: ObjectRandomization | None = ObjectRandomization()
     variants: int = 128
+    seed: int = 0
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ EVALUATION_FILE = "evaluation.json"
 WINDOW_SECONDS, WINDOWS = 3.0, 64
 CARRIED = 0.25
 """Distance within which an object counts as carried, m."""
+EVALUATION_MODELS = 1
+"""Seed of the randomized models of an evaluation (``RandomizationConfig.seed``): training has 0."""
 UNCLIPPED = 1e3
 """Action limit of environments that a policy file acts in: clipping is part of the file."""
 
@@ -79,7 +81,8 @@ def evaluation_options(
     """Returns the options of the environment that a policy for ``options`` is evaluated in.
 
     Episodes start at the motion's first frame and last to its end, the object counts from the
-    first step, physics are the default ones.
+    first step, physics are the default ones. Randomized models are drawn anew: none is one that
+    the policy was trained on.
 
     Args:
         options: Options of the task (``TrainConfig.env_options``).
@@ -91,6 +94,7 @@ def evaluation_options(
         "reset": {"start": "start"},
         "observation": {},
         "termination": {"max_seconds": None, "object_after": 0.0},
+        "randomization": {"seed": EVALUATION_MODELS},
     }
     if not randomized:
         changes["reset"]["noise"] = changes["observation"]["noise"] = None

@@ -59,6 +59,51 @@ def test_without_randomization_all_models_are_the_same(started, quiet):
             np.testing.assert_array_equal(getattr(model, field), expected)
 
 
+OFF = {"mass": None, "centre_of_mass": 0.0, "inertia": None, "shape": 0.0}
+DERIVED = {
+    "actuator_acc0", "body_invweight0", "body_sameframe", "body_subtreemass", "bvh_aabb", "dof_M0",
+    "dof_invweight0", "dof_length", "geom_aabb", "geom_rbound",
+}  # fmt: skip
+"""What the compiler and ``mj_setConst`` make of the other fields."""
+
+
+@pytest.mark.parametrize(
+    ("randomization", "fields"),
+    [
+        ({"torso_centre_of_mass": (0.025, 0.05, 0.075)}, {"body_ipos"}),
+        ({"friction": (0.3, 1.2)}, {"geom_friction"}),
+        ({"object": OFF | {"mass": (0.1, 2.0)}}, {"body_mass", "body_inertia"}),
+        ({"object": OFF | {"centre_of_mass": 0.08}}, {"body_ipos"}),
+        ({"object": OFF | {"inertia": (0.5, 1.5)}}, {"body_inertia"}),
+        ({"object": OFF | {"shape": 0.1}}, {"geom_size", "body_inertia", "body_iquat"}),
+    ],
+    ids=lambda v: "-".join(v),
+)
+def test_nothing_else_of_the_model_changes(started, randomization, fields):
+    env = started(20, **only(**randomization))
+    base, changed, rows = env.simulation.model, set(), set()
+    dofs = slice(-6, None) if "object" in randomization else slice(None)
+    for model in models(env):
+        for name in mujoco.batch.MODEL_FIELDS:
+            value, was = getattr(model, name, None), getattr(base, name, None)
+            if isinstance(value, np.ndarray) and not np.array_equal(value, was):
+                changed.add(name)
+                different = (value != was).reshape(len(value), -1).any(axis=1)
+                if name in fields and name.startswith("body_"):
+                    rows |= {base.body(int(i)).name for i in np.flatnonzero(different)}
+                if name == "dof_M0":
+                    assert different[dofs].any() and different.sum() == different[dofs].sum()
+    assert changed - DERIVED == fields
+    assert rows <= ({OBJECT} if "object" in randomization else {TORSO})
+
+
+def test_models_of_another_seed_are_others(started):
+    one, two, other = (started(1, randomization={"seed": s}) for s in (0, 0, 1))
+    masses = [e.simulation._variants.fields["body_mass"][:, -1] for e in (one, two, other)]
+    np.testing.assert_array_equal(masses[0], masses[1])
+    assert not set(masses[0]) & set(masses[2])
+
+
 def test_torso_centre_of_mass(started):
     env = started(**only(torso_centre_of_mass=(0.025, 0.05, 0.075)))
     assert changed_bodies(env, "body_ipos") == {TORSO}

@@ -30,6 +30,23 @@ def test_options_of_the_task_are_kept_but_for_what_evaluation_fixes():
     assert task["observation"] == {"state_estimation": False}
 
 
+def test_the_randomized_models_are_none_that_training_had(sway):
+    options = {"reference": sway(), "randomization": {"variants": 20, "push": None}}
+    pools = {}
+    for name, some in (
+        ("training", options),
+        ("evaluation", evaluation_options(options)),
+        ("file", evaluation_options(options, file=True)),
+    ):
+        env = OmniVectorEnv(1, num_threads=1, **some)
+        assert env.config.randomization.push is None
+        pools[name] = env.simulation._variants.fields["body_mass"][:, -1]
+        assert len(set(pools[name])) == 20
+        env.close()
+    assert not set(pools["training"]) & set(pools["evaluation"])
+    np.testing.assert_array_equal(pools["evaluation"], pools["file"])
+
+
 def test_without_randomization_nothing_is_left_to_chance(standing):
     options = evaluation_options({"reference": standing}, randomized=False)
     returns = []
