@@ -18,11 +18,11 @@ class Export:
     run_dir: tyro.conf.Positional[Path]
     """Run directory written by train.py."""
 
-    profile: Literal["beyondmimic"] = "beyondmimic"
-    """Convention of the file."""
+    profile: Literal["beyondmimic", "holosoma", "unitree"] = "beyondmimic"
+    """Convention of the file: whose deploy stack reads it."""
 
     out: Path | None = None
-    """Where the file goes; RUN/policy.onnx by default."""
+    """Where the file goes; RUN/policy.onnx by default, RUN/PROFILE/policy.onnx for the others."""
 
     json: bool = False
     """Print JSON."""

@@ -13,6 +13,7 @@ from omni_envs.errors import InvalidOptionError
 from omni_envs.references import Reference
 from omni_envs.robots import Robot
 from omni_envs.tracking import ObservationLayout, TrackingConfig
+from omni_envs.tracking.observations import ObservationTerm
 
 COMMAND = "command"
 """Observation term that starts with the reference joint positions."""
@@ -69,9 +70,15 @@ class PolicyDescription:
             "body_names": ",".join(self.robot.tracked_bodies),
         }
 
-    def sidecar(self) -> dict[str, Any]:
-        """Returns everything as JSON-compatible data, full precision."""
+    def sidecar(self, terms: Sequence[tuple[str, ObservationTerm]] | None = None) -> dict[str, Any]:
+        """Returns everything as JSON-compatible data, full precision.
+
+        Args:
+            terms: Name and term of the file's observation in its order, by default our own.
+        """
         actuators = self.robot.actuators
+        terms = [(t.name, t) for t in self.layout.terms] if terms is None else terms
+        starts = np.cumsum([0, *(t.size for _, t in terms)]).tolist()
         return {
             "omni_envs_version": omni_envs.__version__,
             "robot": self.robot.name,
@@ -86,13 +93,13 @@ class PolicyDescription:
                 "actions_term": "the previous output of this file",
                 "terms": [
                     {
-                        "name": t.name,
-                        "start": t.start,
+                        "name": name,
+                        "start": start,
                         "size": t.size,
                         "unit": t.unit,
                         "meaning": t.meaning,
                     }
-                    for t in self.layout.terms
+                    for (name, t), start in zip(terms, starts, strict=False)
                 ],
             },
             "joint_names": list(self.robot.joint_names),
@@ -128,6 +135,29 @@ def describe(env: Any) -> PolicyDescription:
     return PolicyDescription(
         base.robot, base.references[0], base.policy_layout, base.config, targets
     )
+
+
+def need_torso_alone(description: PolicyDescription, profile: str) -> None:
+    """Refuses policies that a stack would feed with something else than they were trained on.
+
+    Args:
+        description: The policy.
+        profile: The stack's, which estimates no state and compares the torso with the motion.
+
+    Raises:
+        InvalidOptionError: The policy observes estimated state, or another anchor than the torso.
+    """
+    robot = description.robot
+    wrong = None
+    if description.config.observation.state_estimation:
+        wrong = f"{description.layout.size} numbers, with estimated position and velocity"
+    elif description.anchor_body != robot.torso_body:
+        wrong = f"the {description.anchor_body} compared with the motion, not {robot.torso_body}"
+    if wrong:
+        raise InvalidOptionError(
+            f"Profile {profile!r}: the policy was trained on {wrong}, which the stack does not "
+            'have. Train with observation={"state_estimation": false} and anchor="torso".'
+        )
 
 
 def _csv(values: Sequence[float] | np.ndarray) -> str:

@@ -6,21 +6,21 @@ import numpy as np
 import torch
 
 from omni_envs.errors import InvalidDataError
-from omni_envs.export.beyondmimic import OUTPUTS, BeyondMimicGraph
+from omni_envs.export.graph import PolicyGraph
 from omni_envs.training.onnx_policy import OnnxPolicy
 
 TOLERANCE = 1e-5
 MAX_OBSERVATIONS = 32
 
 
-def parity(graph: BeyondMimicGraph, file: OnnxPolicy, observations: np.ndarray) -> float:
+def parity(graph: PolicyGraph, file: OnnxPolicy, observations: np.ndarray) -> float:
     """Compares every output of file and network, the motion's end and beyond included.
 
     Args:
         graph: The exported network.
         file: The file.
-        observations: (K, ·) observations to compare at, each at several time steps from 0 to beyond
-            the motion's end; the first 32 count.
+        observations: (K, ·) observations of the environment to compare at, each at several time
+            steps from 0 to beyond the motion's end; the first 32 count.
 
     Returns:
         Largest absolute difference.
@@ -30,15 +30,18 @@ def parity(graph: BeyondMimicGraph, file: OnnxPolicy, observations: np.ndarray) 
     """
     end = graph.last_frame
     differences: dict[str, float] = {}
+    if graph.order is not None:
+        observations = observations[:, graph.order]
     for frame in sorted({0, 1, end // 2, end - 1, end, end + 1, end + 1000}):
         for observation in observations[:MAX_OBSERVATIONS]:
+            fed = (
+                torch.as_tensor(observation, dtype=torch.float32)[None],
+                torch.tensor([[float(frame)]]),
+            )
             with torch.no_grad():
-                expected = graph(
-                    torch.as_tensor(observation, dtype=torch.float32)[None],
-                    torch.tensor([[float(frame)]]),
-                )
+                expected = graph(*fed[: len(graph.inputs)])
             found = file.run(observation, frame)
-            for name, tensor in zip(OUTPUTS, expected, strict=True):
+            for name, tensor in zip(graph.outputs, expected, strict=True):
                 key = f"{name} at time step {frame}"
                 # numpy's maximum keeps a NaN: that is a difference too.
                 difference = np.abs(found[name] - tensor.numpy()).max()

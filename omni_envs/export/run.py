@@ -10,7 +10,7 @@ from typing import Any
 from omni_envs.errors import UnknownNameError
 from omni_envs.training.config import TrainConfig
 
-PROFILES = ("beyondmimic",)
+PROFILES = ("beyondmimic", "holosoma", "unitree")
 
 
 def export_run(
@@ -28,7 +28,8 @@ def export_run(
     Args:
         run: Run directory.
         profile: Convention of the file.
-        out: The file, by default ``RUN/policy.onnx``.
+        out: The file, by default ``RUN/policy.onnx``, of another profile than ``beyondmimic``
+            ``RUN/<profile>/policy.onnx``.
         origin: Where the file says that it comes from, by default the run directory.
 
     Returns:
@@ -37,16 +38,18 @@ def export_run(
 
     Raises:
         UnknownNameError: There is no such profile.
+        InvalidOptionError: The profile's stack would feed the policy with something else than it
+            was trained on.
         FileFormatError: Configuration or checkpoint is missing or damaged.
         InvalidDataError: The file does not do what the network does.
         MissingDependencyError: A package of the extra ``export`` is not installed.
     """
     if profile not in PROFILES:
         raise UnknownNameError("profile", profile, PROFILES)
-    from omni_envs.export.beyondmimic import BeyondMimicGraph, write_beyondmimic
     from omni_envs.export.closed_loop import closed_loop
     from omni_envs.export.description import describe
     from omni_envs.export.parity import parity
+    from omni_envs.export.profiles import WRITERS
     from omni_envs.training.checkpoint import Checkpoint
     from omni_envs.training.evaluate import make_evaluation_env
     from omni_envs.training.network_policy import NetworkPolicy, find_checkpoint, load_actor
@@ -58,21 +61,23 @@ def export_run(
         config = replace(config, out=Path(origin))
     checkpoint = find_checkpoint(run)
     steps = Checkpoint.load(checkpoint).steps
-    path = Path(out) if out is not None else run / "policy.onnx"
+    folder = run if profile == PROFILES[0] else run / profile
+    path = Path(out) if out is not None else folder / "policy.onnx"
     env = make_evaluation_env(config, 1)
     try:
         description = describe(env)
     finally:
         env.close()
     actor = load_actor(checkpoint)
-    graph = BeyondMimicGraph(actor, description)
-    write_beyondmimic(graph, path, description.metadata(str(config.out)))
+    graph = WRITERS[profile].graph(actor, description)
+    files = WRITERS[profile].write(graph, description, path, str(config.out))
     try:
         file = OnnxPolicy(path)
         loop = closed_loop(config, NetworkPolicy(actor), file)
         difference = parity(graph, file, loop.observations)
     except BaseException:
-        path.unlink(missing_ok=True)
+        for written in files:
+            written.unlink(missing_ok=True)
         raise
     figures = {
         "parity_max_abs": difference,
@@ -83,7 +88,8 @@ def export_run(
     sidecar = path.with_suffix(".json")
     content = {
         "profile": profile,
-        **description.sidecar(),
+        "files": [written.name for written in files],
+        **description.sidecar(graph.terms),
         "checks": figures,
         "command": config.command(),
         "training": config.to_dict(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,14 @@ import numpy as np
 
 from omni_envs.errors import FileFormatError, InvalidDataError, MissingDependencyError
 
-INPUTS = ("obs", "time_step")
+INPUTS = (("obs", "time_step"), ("obs",))
 ACTIONS = "actions"
+ORDER = "omni_envs_observation_order"
+"""Metadata of a file that takes observations in another order: our place of each of its entries."""
 
 
 class OnnxPolicy:
-    """Runs an ONNX file of the ``beyondmimic`` profile in ONNX Runtime, one thread.
+    """Runs an exported ONNX file, of any profile, in ONNX Runtime, one thread.
 
     Args:
         path: The file.
@@ -49,15 +52,20 @@ class OnnxPolicy:
             reason = str(error).splitlines()[0]
             raise FileFormatError(path, "content", "an ONNX model", reason) from error
         shapes = {i.name: i.shape for i in self._session.get_inputs()}
-        if tuple(shapes) != INPUTS or shapes["time_step"] != [1, 1]:
+        if tuple(shapes) not in INPUTS or shapes.get("time_step", [1, 1]) != [1, 1]:
             raise FileFormatError(
-                path, "inputs", "obs [1, ·] and time_step [1, 1]", f"{shapes or 'none'}"
+                path,
+                "inputs",
+                "obs [1, ·], and time_step [1, 1] where it needs it",
+                f"{shapes or 'none'}",
             )
+        self._inputs = tuple(shapes)
         self.outputs = tuple(o.name for o in self._session.get_outputs())
         if self.outputs[:1] != (ACTIONS,):
             raise FileFormatError(path, "outputs", "actions first", f"{self.outputs}")
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
         self.observation_size = int(shapes["obs"][1])
+        self._order = self._read_order()
 
     def __call__(self, observations: np.ndarray, frames: np.ndarray) -> np.ndarray:
         """Returns the actions (N, n) for observations (N, ·) at reference frames (N,)."""
@@ -68,13 +76,27 @@ class OnnxPolicy:
                 f"(N, {self.observation_size})",
                 f"{observations.shape}",
             )
-        rows = zip(observations, frames, strict=True)
+        rows = zip(observations[:, self._order], frames, strict=True)
         return np.concatenate([self.run(o, int(f))[ACTIONS] for o, f in rows])
 
     def run(self, observation: np.ndarray, frame: int) -> dict[str, Any]:
-        """Returns every output, each with a leading 1, for one observation and frame."""
+        """Returns every output, each with a leading 1, for one observation as the file has it."""
         fed = {
             "obs": np.asarray(observation, np.float32)[None],
             "time_step": np.array([[frame]], np.float32),
         }
+        fed = {name: fed[name] for name in self._inputs}
         return dict(zip(self.outputs, self._session.run(None, fed), strict=True))
+
+    def _read_order(self) -> np.ndarray:
+        """Returns the (size,) places of the file's entries in our observation."""
+        plain = np.arange(self.observation_size)
+        if ORDER not in self.metadata:
+            return plain
+        try:
+            order = np.asarray(json.loads(self.metadata[ORDER]))
+        except ValueError as error:
+            raise FileFormatError(self.path, ORDER, "a list", self.metadata[ORDER]) from error
+        if not np.array_equal(np.sort(order.ravel()), plain):
+            raise FileFormatError(self.path, ORDER, "every entry once", self.metadata[ORDER])
+        return order

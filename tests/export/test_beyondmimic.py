@@ -11,7 +11,7 @@ import onnx
 import torch
 
 from omni_envs.errors import InvalidDataError
-from omni_envs.export.beyondmimic import OUTPUTS, BeyondMimicGraph, write_beyondmimic
+from omni_envs.export.beyondmimic import BeyondMimicGraph, write_beyondmimic
 from omni_envs.export.description import PolicyDescription
 from omni_envs.export.parity import parity
 from omni_envs.robots import G1
@@ -44,7 +44,7 @@ def _actor(size: int, outputs: int = 29) -> torch.nn.Module:
 def _export(motion, tmp_path, **options):
     description = _description(motion, **options)
     graph = BeyondMimicGraph(_actor(description.layout.size), description)
-    path = write_beyondmimic(graph, tmp_path / "policy.onnx", description.metadata("runs/x"))
+    (path,) = write_beyondmimic(graph, description, tmp_path / "policy.onnx", "runs/x")
     return description, graph, OnnxPolicy(path)
 
 
@@ -57,7 +57,7 @@ def test_file_computes_what_the_network_computes(motion, tmp_path, mode, state_e
     }
     description, graph, file = _export(motion, tmp_path, **options)
     assert file.observation_size == description.layout.size == (160 if state_estimation else 154)
-    assert file.outputs == OUTPUTS
+    assert file.outputs == BeyondMimicGraph.outputs
     observations = RNG.normal(size=(8, file.observation_size)) * 3
     assert parity(graph, file, observations) <= 1e-5
 

@@ -9,6 +9,7 @@ pytest.importorskip("onnx")
 import torch
 
 import omni_envs  # noqa: F401  (registers the environments)
+from omni_envs.cli import main
 from omni_envs.envs import OmniVectorEnv
 from omni_envs.errors import (
     FileFormatError,
@@ -16,7 +17,7 @@ from omni_envs.errors import (
     InvalidOptionError,
     UnknownNameError,
 )
-from omni_envs.export import closed_loop, export_run
+from omni_envs.export import PROFILES, closed_loop, export_run
 from omni_envs.export.description import describe
 from omni_envs.training.network_policy import NetworkPolicy, find_checkpoint, load_actor
 from omni_envs.training.onnx_policy import OnnxPolicy
@@ -39,6 +40,55 @@ def run(motion, tmp_path_factory) -> Path:
     )
     train(config)
     return config.out
+
+
+@pytest.fixture(scope="module")
+def torso_run(motion, tmp_path_factory) -> Path:
+    """What every stack can feed: no estimated state, the torso compared with the motion."""
+    folder = tmp_path_factory.mktemp("torso")
+    reference = str(motion.save(folder / "motion.npz"))
+    options = {"reference": reference, "anchor": "torso"}
+    config = RECIPES["small"].config(
+        "OmniEnvs/G1BoxCarry-v0",
+        folder / "run",
+        32,
+        num_envs=4,
+        num_threads=1,
+        env_options={**options, "observation": {"state_estimation": False}},
+        ppo={"rollout_steps": 8, "hidden": (8,), "epochs": 1, "minibatches": 1},
+    )
+    train(config)
+    return config.out
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_profile_is_proved_in_closed_loop(torso_run, profile):
+    rows = export_run(torso_run, profile=profile)
+    folder = torso_run if profile == "beyondmimic" else torso_run / profile
+    assert rows["path"] == str(folder / "policy.onnx") and rows["parity_max_abs"] <= 1e-5
+    assert rows["closed_loop_return"] == pytest.approx(rows["closed_loop_return_network"], rel=1e-3)
+    sidecar = json.loads(Path(rows["sidecar"]).read_text())
+    assert sidecar["profile"] == profile and sidecar["action"]["trained_as"] == "feedforward"
+    assert all((folder / name).is_file() for name in sidecar["files"])
+    assert sidecar["observation"]["size"] == 154
+
+
+def test_files_of_a_stack_that_fail_their_proof_do_not_stay(torso_run, tmp_path, monkeypatch):
+    def fails(*_):
+        raise InvalidDataError("file", "return", "another", "this one")
+
+    monkeypatch.setattr(closed_loop, "closed_loop", fails)
+    with pytest.raises(InvalidDataError):
+        export_run(torso_run, profile="unitree", out=tmp_path / "policy.onnx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_takes_the_profile(run, torso_run, tmp_path, capsys):
+    out = str(tmp_path / "policy.onnx")
+    assert main(["export", str(torso_run), "--profile", "unitree", "--out", out, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["path"] == out
+    assert main(["export", str(run), "--profile", "holosoma"]) == 1
+    assert "Train with observation=" in capsys.readouterr().err
 
 
 def test_a_file_is_proved_and_described(run):
