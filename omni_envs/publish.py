@@ -11,12 +11,13 @@ from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import ProgressCallback
 
 if TYPE_CHECKING:
+    from omni_envs.references import Reference
     from omni_envs.training.checkpoint import Checkpoint
     from omni_envs.training.config import TrainConfig
     from omni_envs.training.evaluate import Evaluation
 
 EPISODES = 200
-CARD, STRIP = "README.md", "rollout.png"
+CARD, STRIP, MOTION = "README.md", "rollout.png", "reference.npz"
 PICTURES, COLUMNS = 12, 6
 
 
@@ -31,7 +32,8 @@ def publish(
     """Evaluates and exports a run and puts together what belongs to a published policy.
 
     The folder is a run directory itself, so that it can be evaluated and exported again; of the
-    training it keeps the weights and the curve.
+    training it keeps the weights, the curve and the motion: what a later version of the package
+    makes of the demonstration would be another one.
 
     Args:
         run: Run directory.
@@ -75,7 +77,9 @@ def publish(
         )
     shutil.rmtree(out / FOLDER, ignore_errors=True)
     out.mkdir(parents=True, exist_ok=True)
-    config.save(out)
+    _motion(config).save(out / MOTION)
+    kept = replace(config, env_options={**config.env_options, "reference": MOTION})
+    kept.save(out)
     # What going on would need is left out, above all the optimiser's moments.
     slim = replace(state, optimizer={}, rng=state.rng[:0], history=[], episodes=[])
     slim = replace(slim, environment=None, device_rng=None)
@@ -85,10 +89,30 @@ def publish(
     write_history(out, _thinned(history))
     if state.history:
         plot_curve(out, history, _control_step(config))
-    exported = export_run(out, origin=config.out)
-    steps, fell = _strip(config, Path(exported["path"]), out / STRIP)
+    exported = export_run(out, described=config)
+    steps, fell = _strip(TrainConfig.load(out), Path(exported["path"]), out / STRIP)
     _write_card(out, config, state, evaluation, f"{steps} control steps" + (", a fall" * fell))
     return {**asdict(evaluation), **exported, "card": str(out / CARD)}
+
+
+def _motion(config: TrainConfig) -> Reference:
+    """Returns the motion that the policy tracks.
+
+    Raises:
+        InvalidOptionError: There are several: a policy file holds one.
+    """
+    from omni_envs.training.evaluate import make_evaluation_env
+
+    env = make_evaluation_env(config, 1, randomized=False)
+    try:
+        references = env.unwrapped.references  # type: ignore[attr-defined]
+    finally:
+        env.close()
+    if len(references) != 1:
+        raise InvalidOptionError(
+            f"A published policy holds one motion; this one tracks {len(references)}."
+        )
+    return references[0]
 
 
 def _thinned(history: list[dict[str, float]], rows: int = 500) -> list[dict[str, float]]:
@@ -169,6 +193,7 @@ All figures: `evaluation.json`; training: `curve.csv`, `config.json`.
 
 * `policy.onnx`, `policy.json`: network, normalisation and motion, as BeyondMimic's deploy stack
   reads them; joint target = default + scale · action at 50 Hz.
+* `reference.npz`: the motion that it tracks.
 * `checkpoints/`: weights of actor and critic (`torch.load(..., weights_only=True)`).
 
 The folder is a run directory: `omni-envs export` and `omni_envs.training.evaluate.evaluate_run`

@@ -10,7 +10,7 @@ pytest.importorskip("torch")
 pytest.importorskip("onnxruntime")
 import torch
 
-from omni_envs.publish import CARD, STRIP
+from omni_envs.publish import CARD, MOTION, STRIP
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.evaluate import make_evaluation_env
 from omni_envs.training.network_policy import NetworkPolicy, find_checkpoint, load_actor
@@ -30,7 +30,7 @@ def test_the_card_is_about_the_evaluation(folder):
     assert figures["episodes"] >= 200 and figures["success_rate"] >= 0.8
     assert f"**{figures['success_rate']:.1%}**" in card
     assert "python train.py --recipe" in card and "Apache-2.0" in card
-    for name in (STRIP, "curve.png", "curve.csv", "policy.json"):
+    for name in (STRIP, MOTION, "curve.png", "curve.csv", "policy.json"):
         assert (folder / name).stat().st_size > 0
     assert sum(p.stat().st_size for p in folder.rglob("*") if p.is_file()) < 5e6
     assert str(Path.home()) not in card and "/tmp" not in (folder / "config.json").read_text()

@@ -1,5 +1,6 @@
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,9 @@ pytest.importorskip("matplotlib")
 from omni_envs.cli import main
 from omni_envs.errors import InvalidOptionError
 from omni_envs.export import export_run
-from omni_envs.publish import CARD, STRIP, publish
+from omni_envs.publish import CARD, MOTION, STRIP, publish
+from omni_envs.references import open_reference
+from omni_envs.robots import G1
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.evaluate import evaluate_run
 from omni_envs.training.network_policy import find_checkpoint, load_actor
@@ -48,11 +51,11 @@ def folder(run, tmp_path_factory):
     return out
 
 
-def test_the_folder_holds_what_a_policy_needs(folder):
+def test_the_folder_holds_what_a_policy_needs(run, folder):
     names = {p.name for p in folder.iterdir()}
     assert names == {
         CARD, STRIP, "checkpoints", "config.json", "curve.csv", "curve.png", "evaluation.json",
-        "policy.json", "policy.onnx",
+        "policy.json", "policy.onnx", MOTION,
     }  # fmt: skip
     figures = json.loads((folder / "evaluation.json").read_text())
     card = (folder / CARD).read_text()
@@ -61,7 +64,8 @@ def test_the_folder_holds_what_a_policy_needs(folder):
     assert f"**{figures['success_rate']:.1%}**" in card
     config = TrainConfig.load(folder)
     assert config.steps == 64  # those that it got, whatever was asked for
-    assert replace(config, out=Path("runs/sway")).command() in card and "Apache-2.0" in card
+    trained = replace(TrainConfig.load(run), out=Path("runs/sway"), evaluation_episodes=6)
+    assert trained.command() in card and "Apache-2.0" in card
     assert "64 million" not in card and "0.000 million control steps in 0 minutes" in card
     assert f"{config.num_threads} CPU core" in card
     with (folder / "curve.csv").open() as file:
@@ -89,6 +93,31 @@ def test_the_folder_is_a_run_without_the_optimiser(run, folder):
     assert again.success_rate == published["success_rate"]
     assert again.return_mean == pytest.approx(published["return_mean"])
     assert export_run(folder)["parity_max_abs"] <= 1e-5
+
+
+def test_the_folder_keeps_its_motion_wherever_it_goes(run, folder, tmp_path, monkeypatch):
+    moved = Path(shutil.copytree(folder, tmp_path / "moved"))
+    assert json.loads((moved / "config.json").read_text())["env_options"]["reference"] == MOTION
+    monkeypatch.chdir(tmp_path)
+    for place in (moved, Path("moved")):
+        assert Path(TrainConfig.load(place).env_options["reference"]) == place / MOTION
+    config = TrainConfig.load("moved")
+    original = open_reference(TrainConfig.load(run).env_options["reference"], G1)
+    for name in ("qpos", "qvel", "body_positions", "object_poses"):
+        kept = getattr(open_reference(config.env_options["reference"], G1), name)
+        np.testing.assert_array_equal(kept, getattr(original, name))
+    assert evaluate_run("moved").return_mean == pytest.approx(evaluate_run(folder).return_mean)
+
+
+def test_several_motions_are_not_published(run, tmp_path):
+    two = tmp_path / "run"
+    shutil.copytree(run, two)
+    config = TrainConfig.load(run)
+    reference = config.env_options["reference"]
+    replace(config, env_options={**config.env_options, "reference": [reference] * 2}).save(two)
+    with pytest.raises(InvalidOptionError, match="holds one motion; this one tracks 2"):
+        publish(two, tmp_path / "policy", episodes=2)
+    assert not (tmp_path / "policy" / "config.json").exists()
 
 
 def test_training_does_not_go_on_from_it(folder):

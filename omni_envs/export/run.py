@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ def export_run(
     *,
     profile: str = "beyondmimic",
     out: str | Path | None = None,
-    origin: str | Path | None = None,
+    described: TrainConfig | None = None,
 ) -> dict[str, Any]:
     """Exports the newest checkpoint of a run, with a sidecar ``.json`` beside the file.
 
@@ -30,7 +29,7 @@ def export_run(
         profile: Convention of the file.
         out: The file, by default ``RUN/policy.onnx``, of another profile than ``beyondmimic``
             ``RUN/<profile>/policy.onnx``.
-        origin: Where the file says that it comes from, by default the run directory.
+        described: What the file says about its training, by default the run's configuration.
 
     Returns:
         ``path``, ``sidecar``, ``parity_max_abs``, ``closed_loop_return``,
@@ -57,8 +56,7 @@ def export_run(
 
     run = Path(run)
     config = TrainConfig.load(run)
-    if origin is not None:
-        config = replace(config, out=Path(origin))
+    told = described or config
     checkpoint = find_checkpoint(run)
     steps = Checkpoint.load(checkpoint).steps
     folder = run if profile == PROFILES[0] else run / profile
@@ -70,7 +68,7 @@ def export_run(
         env.close()
     actor = load_actor(checkpoint)
     graph = WRITERS[profile].graph(actor, description)
-    files = WRITERS[profile].write(graph, description, path, str(config.out))
+    files = WRITERS[profile].write(graph, description, path, str(told.out))
     try:
         file = OnnxPolicy(path)
         loop = closed_loop(config, NetworkPolicy(actor), file)
@@ -91,8 +89,8 @@ def export_run(
         "files": [written.name for written in files],
         **description.sidecar(graph.terms),
         "checks": figures,
-        "command": config.command(),
-        "training": config.to_dict(),
+        "command": told.command(),
+        "training": told.to_dict(),
     }
     sidecar.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n")
     return {"path": str(path), "sidecar": str(sidecar), **figures}

@@ -99,7 +99,8 @@ class TrainConfig:
         device: Where the network learns: ``"cpu"``, ``"cuda"``, or ``"auto"``, a GPU where there is
             one. Physics is on the CPU. Runs with the same seed are the same to the bit on the CPU.
         env_options: Options of the environment, as ``gymnasium.make`` takes them, JSON-compatible:
-            the task that the policy is for, and is evaluated on.
+            the task that the policy is for, and is evaluated on. A reference that lies in the run
+            directory may be named relative to it in ``config.json``.
         training_options: Options over those in training alone: what helps to learn, such as a
             privileged critic, ``"fast"`` physics or less noise.
         time_limit: Seconds after which training ends before ``steps`` are reached; 0 = no limit.
@@ -226,7 +227,8 @@ class TrainConfig:
             raise FileFormatError(path, "file", "the configuration of a training run", "nothing")
         try:
             data = json.loads(path.read_text())
-            return cls.from_dict({**data, "out": Path(run)})
+            options = _beside(Path(run), data["env_options"]) if "env_options" in data else {}
+            return cls.from_dict({**data, "out": Path(run), "env_options": options})
         except (ValueError, TypeError) as error:
             raise FileFormatError(path, "content", "a TrainConfig as JSON", str(error)) from error
 
@@ -245,6 +247,20 @@ def merged(options: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         both = isinstance(old, Mapping) and isinstance(change, Mapping)
         result[name] = {**old, **change} if both else change  # type: ignore[dict-item]
     return result
+
+
+def _beside(run: Path, options: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Returns options with the references that lie in a run directory named from here."""
+
+    def placed(name: Any) -> Any:
+        inside = isinstance(name, str) and not Path(name).is_absolute() and (run / name).is_file()
+        return str(run / name) if inside else name
+
+    reference = options.get("reference")
+    if reference is None:
+        return options
+    several = isinstance(reference, list)
+    return {**options, "reference": [*map(placed, reference)] if several else placed(reference)}
 
 
 def _positive(owner: str, name: str, value: Any) -> None:
