@@ -92,6 +92,10 @@ def load_deepmimic(
         raise FileFormatError(path, "Frames", expected, short(error)) from error
     if values.ndim != 2 or values.shape[1] != COLUMNS:
         raise FileFormatError(path, "Frames", f"rows of {COLUMNS} numbers", f"{values.shape}")
+    if not np.isfinite(values[:, 0]).all():
+        frame = int(np.argmax(~np.isfinite(values[:, 0])))
+        found = f"NaN or infinity first in frame {frame}"
+        raise FileFormatError(path, "duration of a frame", "finite seconds", found)
     # The last frame's duration is 0 in many clips: it says how long to wait before the loop.
     seconds = float(np.median(values[:, 0]))
     stated = 1.0 / seconds if seconds > 0 else 0.0

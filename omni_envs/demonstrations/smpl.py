@@ -23,7 +23,7 @@ from omni_envs.errors import FileFormatError
 
 KEYS = (
     "trans", "poses", "root_orient", "pose_body", "pose_hand", "betas", "gender",
-    "mocap_framerate", "mocap_frame_rate", "fps",
+    "mocap_framerate", "mocap_frame_rate", "fps", "surface_model_type",
 )  # fmt: skip
 """Arrays of a parameter file that are read; others, pickled ones among them, are left alone."""
 
@@ -41,7 +41,7 @@ class SmplParameters:
         translation: (T, 3) m.
         betas: (B,) shape.
         gender: Gender of the body, where the file says it.
-        kind: ``"smpl"``, ``"smplh"`` or ``"smplx"``, where the size of ``poses`` tells.
+        kind: ``"smpl"``, ``"smplh"`` or ``"smplx"``, where the size of ``poses`` or the file tells.
         fps: Frames per second of the file.
         rows: Frames of the file that these are.
     """
@@ -126,24 +126,25 @@ def read_parameters(
         if poses.shape[1] not in _KINDS:
             expected = "72 (SMPL), 156 (SMPL-H) or 165 (SMPL-X) columns"
             raise FileFormatError(path, "poses", expected, str(poses.shape[1]))
-        kind = _KINDS[poses.shape[1]]
+        kind: str | None = _KINDS[poses.shape[1]]
     else:
         root = _matrix(path, "root_orient", arrays["root_orient"], 3)
         poses = np.hstack([root, _matrix(path, "pose_body", arrays["pose_body"], 63, len(root))])
-        kind = None
+        stated = arrays.get("surface_model_type", np.zeros(0))
+        kind = next((k for k in _JOINTS if k == _text(stated)), None)
     trans = _matrix(path, "trans", arrays["trans"], 3, len(poses))
     betas = arrays.get("betas", np.zeros(10))
     if betas.dtype.kind not in "fiu" or not betas.size or not np.isfinite(betas).all():
         found = f"{betas.dtype} {betas.shape}"
         raise FileFormatError(path, "betas", "finite shape parameters", found)
     rate = next((key for key in _RATES if key in arrays), None)
-    stated = usual_fps
+    stated_fps = usual_fps
     if rate is not None:
         if arrays[rate].size != 1 or arrays[rate].dtype.kind not in "fiu":
             found = f"{arrays[rate].dtype} {arrays[rate].shape}"
             raise FileFormatError(path, rate, "one number", found)
-        stated = float(arrays[rate].reshape(-1)[0])
-    fps = options.frame_rate(path, rate or _RATES[1], stated)
+        stated_fps = float(arrays[rate].reshape(-1)[0])
+    fps = options.frame_rate(path, rate or _RATES[1], stated_fps)
     rows = options.rows(path, len(poses), fps)
     kept = {"poses": poses[rows], "trans": trans[rows]}
     for field, values in kept.items():

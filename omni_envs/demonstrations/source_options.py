@@ -82,10 +82,14 @@ class SourceOptions:
         if self.fps is not None:
             return self.fps
         if stated is None:
-            raise FileFormatError(path, field, "frames per second, or the option fps", "none")
+            raise FileFormatError(
+                path, field, "frames per second, or the option fps (--fps-source)", "none"
+            )
         # Half a percent of grace, for rates that were written with few digits.
         if not MIN_FPS * 0.995 <= stated <= MAX_FPS * 1.005:
-            expected = f"{MIN_FPS:g} to {MAX_FPS:g} frames per second, or the option fps"
+            expected = (
+                f"{MIN_FPS:g} to {MAX_FPS:g} frames per second, or the option fps (--fps-source)"
+            )
             raise FileFormatError(path, field, expected, f"{stated:.6g} frames per second")
         # Frame times have six digits, if that: 0.008333 s is 120 fps.
         return float(round(stated)) if abs(stated - round(stated)) < 1e-4 * stated else stated

@@ -76,6 +76,7 @@ def damaged(change):
         ([[0.03] * 44, [0.03] * 43], "Frames: expected rows of 44 numbers"),
         ([["x"] * 44], "Frames: expected rows of 44 numbers"),
         (damaged(lambda d: d[3].__setitem__(7, float("nan"))), "finite values.*frame 3"),
+        (damaged(lambda d: d[2].__setitem__(0, float("nan"))), "duration.*finite sec.*in frame 2"),
         (damaged(lambda d: d[3].__setitem__(4, 3.0)), "rotation of root.*length 3 in frame 3"),
         (frames(seconds=0.0), "duration of a frame.*found 0 frames"),
         (frames(seconds=33.3), "duration of a frame.*found 0.03"),

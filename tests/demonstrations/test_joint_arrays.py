@@ -104,7 +104,10 @@ def test_an_object_comes_along(person, save, tmp_path):
         ({"positions": np.zeros((5, 22))}, r"positions: expected shape"),
         ({"positions": np.full((5, 22, 3), "x")}, "positions: expected numbers"),
         ({"positions": np.zeros((5, 22, 3))}, "joint positions: expected legs with a length"),
-        ({"fps": None}, "fps: expected frames per second, or the option fps; found none"),
+        (
+            {"fps": None},
+            "fps: expected frames per second, or the option fps .--fps-source.; found none",
+        ),
         ({"fps": 0.0}, "fps: expected a positive number; found 0"),
         ({"fps": np.nan}, "fps: expected a positive number"),
         ({"fps": 1e6}, "fps: expected 5 to 1000 frames per second"),

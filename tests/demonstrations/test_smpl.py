@@ -59,6 +59,28 @@ def test_stage_two_fields_and_a_y_up_world(person, smpl_parameters, write_body, 
     np.testing.assert_allclose(demo.keypoints, expected.keypoints, atol=1e-6)
 
 
+def test_a_file_of_body_parts_names_its_model(person, smpl_parameters, write_body, save, tmp_path):
+    """Of a folder with several models the one that the file names is taken."""
+    arrays = smpl_parameters(person())
+    poses = arrays.pop("poses")
+    arrays |= {"root_orient": poses[:, :3], "pose_body": poses[:, 3:66]}
+    write_body(tmp_path / "bodies/smplh/neutral/model.npz")
+    write_body(tmp_path / "bodies/smplx/SMPLX_NEUTRAL.npz", v_template=np.zeros(3))
+    path = save(**arrays, surface_model_type=np.array("smplh"))
+    assert load_demonstration(path, body_model=tmp_path / "bodies").num_frames == 61
+    with pytest.raises(FileFormatError, match=r"SMPLX_NEUTRAL\.npz: v_template"):
+        load_demonstration(save(**arrays), body_model=tmp_path / "bodies")
+
+
+@pytest.mark.parametrize("gender", ["male", b"MALE", ["male"], [b"male"]])
+def test_gender_chooses_the_model(person, smpl_parameters, write_body, save, tmp_path, gender):
+    arrays = smpl_parameters(person()) | {"gender": np.array(gender)}
+    write_body(tmp_path / "smplh/male/model.npz")
+    write_body(tmp_path / "smplh/neutral/model.npz", v_template=np.zeros(3))
+    path = save(**arrays)
+    assert load_demonstration(path, body_model=tmp_path).num_frames == 61
+
+
 def test_shape_parameters_count(person, smpl_parameters, write_body, save, tmp_path):
     arrays = smpl_parameters(person())
     body = write_body(tmp_path / "model.npz")
