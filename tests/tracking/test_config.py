@@ -53,6 +53,7 @@ def test_object_termination_of_the_paper():
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=PRESETS)
 def test_observation_noise(preset):
     noise = preset.observation.noise
+    assert noise.anchor_position == (0.0 if preset is PAPER else 0.25)
     assert noise.anchor_orientation == 0.05
     assert noise.base_linear_velocity == 0.5
     assert noise.base_angular_velocity == 0.2
@@ -125,6 +126,7 @@ def test_values_of_beyondmimic():
     assert c.randomization.torso_centre_of_mass == (0.025, 0.05, 0.05)
     assert c.randomization.push.linear == (0.5, 0.5, 0.2)
     assert c.randomization.push.angular == (0.52, 0.52, 0.78)
+    assert c.randomization.friction == (0.3, 1.2)
     assert c.observation.noise.anchor_position == 0.25
     assert c.reward.contact_rule == "any"
     adaptive = c.reset.adaptive
