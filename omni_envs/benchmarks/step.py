@@ -41,9 +41,10 @@ def bench_step(
 
     The actions aim at the reference, with noise: episodes start all over it and last for about half
     a second. Raw physics is ``mujoco.batch``: ``step(nstep=substeps)`` with constant controls,
-    nothing read. It repeats every control step of the environment: same per-simulation models, same
-    states, same joint targets. The two take turns step by step, so that whatever else the machine
-    does hits both alike.
+    nothing read. It makes every control step of the environment, too: same per-simulation models,
+    same states, same joint targets. The two take turns step by step, so that whatever else the
+    machine does hits both alike, and take turns in who is first: the second finds what the first
+    has left in the processor's caches and branch predictors.
 
     Args:
         env: Environment id.
@@ -66,19 +67,19 @@ def bench_step(
     raw = Batch(vector.simulation.model, num_envs, live.nthread)
     substeps = vector.config.physics.substeps
 
-    def pair() -> tuple[float, float, bool]:
+    def pair(raw_first: bool) -> tuple[float, float, bool]:
         nonlocal observations
         action = aim(vector, observations, rng)
         vector.simulation.copy_models_to(raw)
+        vector.aim(action)
         for name in _STATE:
             raw.bind(name)[:] = live.bind(name)
-        started = time.perf_counter()
-        observations = vector.step(action)[0]
-        ours = time.perf_counter() - started
-        raw.bind("ctrl")[:] = live.bind("ctrl")
-        started = time.perf_counter()
-        raw.step(nstep=substeps)
-        return ours, time.perf_counter() - started, False
+
+        def ours() -> None:
+            nonlocal observations
+            observations = vector.step(action)[0]
+
+        return *_timed(ours, lambda: raw.step(nstep=substeps), raw_first), False
 
     figures = _measure(pair, num_envs, seconds)
     vector.close()
@@ -108,23 +109,29 @@ def bench_single(
     vector: OmniVectorEnv = single.unwrapped.vector
     observation, _ = single.reset(seed=seed)
     simulation, substeps = vector.simulation, vector.config.physics.substeps
-    model, data = simulation.model, mujoco.MjData(simulation.model)
+    model, data = simulation.model_of(0), mujoco.MjData(simulation.model)
     rng = np.random.default_rng(seed)
+    over = True
 
-    def pair() -> tuple[float, float, bool]:
-        nonlocal observation
-        action = aim(vector, observation[None], rng)[0]
+    def pair(raw_first: bool) -> tuple[float, float, bool]:
+        nonlocal over
+        action = aim(vector, observation[None], rng)
+        if over:
+            simulation.batch.get_model(0, model)
+        vector.aim(action)
         for name in _STATE:
             getattr(data, name)[:] = simulation.batch.bind(name)[0]
-        started = time.perf_counter()
-        observation, _, terminated, truncated, _ = single.step(action)
-        if terminated or truncated:
-            observation, _ = single.reset()
-        ours = time.perf_counter() - started
-        data.ctrl[:] = simulation.ctrl[0]
-        started = time.perf_counter()
-        mujoco.mj_step(model, data, substeps)
-        return ours, time.perf_counter() - started, terminated or truncated
+        over = False
+
+        def ours() -> None:
+            nonlocal observation, over
+            observation, _, terminated, truncated, _ = single.step(action[0])
+            over = terminated or truncated
+            if over:
+                observation, _ = single.reset()
+
+        times = _timed(ours, lambda: mujoco.mj_step(model, data, substeps), raw_first)
+        return *times, over
 
     return _measure(pair, 1, seconds)
 
@@ -137,25 +144,41 @@ def bench_humanoid(*, seconds: float = 5.0, seed: int = 0) -> dict[str, float]:
     model, data = inner.model, mujoco.MjData(inner.model)
     rng = np.random.default_rng(seed)
 
-    def pair() -> tuple[float, float, bool]:
+    over = False
+
+    def pair(raw_first: bool) -> tuple[float, float, bool]:
         action = rng.uniform(-0.4, 0.4, env.action_space.shape).astype(np.float32)
         for name in _STATE:
             getattr(data, name)[:] = getattr(inner.data, name)
-        started = time.perf_counter()
-        _, _, terminated, truncated, _ = env.step(action)
-        if terminated or truncated:
-            env.reset()
-        ours = time.perf_counter() - started
-        data.ctrl[:] = inner.data.ctrl
-        started = time.perf_counter()
-        mujoco.mj_step(model, data, inner.frame_skip)
-        return ours, time.perf_counter() - started, terminated or truncated
+        data.ctrl[:] = action
+
+        def ours() -> None:
+            nonlocal over
+            _, _, terminated, truncated, _ = env.step(action)
+            over = terminated or truncated
+            if over:
+                env.reset()
+
+        times = _timed(ours, lambda: mujoco.mj_step(model, data, inner.frame_skip), raw_first)
+        return *times, over
 
     return _measure(pair, 1, seconds)
 
 
+def _timed(
+    ours: Callable[[], None], raw: Callable[[], None], raw_first: bool
+) -> tuple[float, float]:
+    """Returns how long both take, s, ours first; ``raw_first`` is the order that they run in."""
+    times = []
+    for run in (raw, ours) if raw_first else (ours, raw):
+        started = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - started)
+    return (times[1], times[0]) if raw_first else (times[0], times[1])
+
+
 def _measure(
-    pair: Callable[[], tuple[float, float, bool]], steps: int, seconds: float
+    pair: Callable[[bool], tuple[float, float, bool]], steps: int, seconds: float
 ) -> dict[str, float]:
     """Repeats pairs of ``steps`` control steps, by the environment and by raw physics.
 
@@ -165,7 +188,7 @@ def _measure(
     rows: list[tuple[float, float, bool]] = []
     finish = time.perf_counter() + seconds
     while time.perf_counter() < finish or len(rows) < 3:
-        rows.append(pair())
+        rows.append(pair(len(rows) % 2 == 1))
     times, started = np.array([row[:2] for row in rows]), np.array([row[2] for row in rows])
     ours, raw = sum(
         np.quantile(times[which], QUARTILE, axis=0) * which.mean()

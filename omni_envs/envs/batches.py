@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -31,11 +30,11 @@ def copied(observations: Observation) -> Observation:
     return observations.copy()
 
 
-def first_row(observations: Observation) -> Observation:
-    """Returns a copy of the first simulation's observation."""
+def row_of(observations: Observation, index: int = 0) -> Observation:
+    """Returns a copy of one simulation's observation."""
     if isinstance(observations, dict):
-        return {key: values[0].copy() for key, values in observations.items()}
-    return observations[0].copy()
+        return {key: values[index].copy() for key, values in observations.items()}
+    return observations[index].copy()
 
 
 def empty_observations(num: int, policy: int, critic: int | None) -> Observation:
@@ -46,45 +45,36 @@ def empty_observations(num: int, policy: int, critic: int | None) -> Observation
     return {key: np.empty((num, size), np.float32) for key, size in sizes.items()}
 
 
-def batched_infos(values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Returns infos that every simulation has: each key with a mask ``_key`` of who has it."""
-    infos: dict[str, Any] = dict(values)
-    everyone = np.ones(len(next(iter(values.values()))), bool)
-    infos.update(dict.fromkeys(map(_mask_name, values), everyone))
-    return infos
+def masked_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Returns the keys of infos: the names, then for each the mask ``_name`` of who has it."""
+    return (*names, *(f"_{name}" for name in names))
 
 
-@cache
-def _mask_name(key: str) -> str:
-    return f"_{key}"
+def batched_infos(keys: tuple[str, ...], rows: list[np.ndarray], who: np.ndarray) -> dict[str, Any]:
+    """Returns infos.
+
+    Args:
+        keys: From ``masked_names``.
+        rows: (N,) values of each name.
+        who: (N,) which simulations have them.
+    """
+    return dict(zip(keys, rows + [who] * len(rows), strict=True))
 
 
 def add_finals(
-    infos: dict[str, Any], observations: Observation, done: np.ndarray
-) -> dict[str, Any]:
+    infos: dict[str, Any], final_info: dict[str, Any], observations: Observation, done: np.ndarray
+) -> None:
     """Adds ``final_obs`` and ``final_info`` of finished simulations, as SyncVectorEnv does.
 
     Args:
-        infos: Infos of the step, still those of the finished episodes.
+        infos: To add to: ``final_obs``, an (N,) object array of observations and None, and
+            ``final_info``.
+        final_info: Infos of the step, masked by ``done``.
         observations: (N, …) observations, still those of the finished episodes.
         done: (N,) which simulations are finished.
-
-    Returns:
-        ``infos`` with ``final_obs``, an (N,) object array of observations and None, and
-        ``final_info`` with the infos of the step masked by ``done``.
     """
     final_obs = np.full(len(done), None, dtype=object)
-    for i in np.flatnonzero(done):
-        final_obs[i] = (
-            {key: rows[i].copy() for key, rows in observations.items()}
-            if isinstance(observations, dict)
-            else observations[i].copy()
-        )
-    mask = done.copy()
-    final_info = {k: mask if k.startswith("_") else v for k, v in infos.items()}
-    return infos | {
-        "final_obs": final_obs,
-        "_final_obs": mask,
-        "final_info": final_info,
-        "_final_info": mask,
-    }
+    for i in done.nonzero()[0].tolist():
+        final_obs[i] = row_of(observations, i)
+    infos["final_obs"], infos["_final_obs"] = final_obs, done
+    infos["final_info"], infos["_final_info"] = final_info, done

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from omni_envs.envs.batches import Observation
 from omni_envs.envs.episodes import Episodes
+from omni_envs.envs.kinematics import body_tree
 from omni_envs.envs.simulation import Simulation
 from omni_envs.envs.task import TrackingTask
 from omni_envs.tracking import kernels
 from omni_envs.tracking.motion import MotionLibrary
-from omni_envs.tracking.randomization import start_widths, symmetric
+from omni_envs.tracking.randomization import start_widths
 
 TESTS = ("anchor_height", "anchor_tilt", "end_effector_height", "object")
 
@@ -51,6 +52,7 @@ class CompiledTask:
         flags: Names of rows of ``Judged.flags``, as in infos, without tests that are switched off.
         flag_rows: Their rows.
         noise_share: Share of the noise on the policy's observation; see ``NoiseGrowth``.
+        draws: Numbers that a start state takes.
 
     Args:
         task: The task, names resolved.
@@ -62,7 +64,8 @@ class CompiledTask:
     def __init__(self, task: TrackingTask, library: MotionLibrary, num: int, samples: int) -> None:
         self._everyone = np.arange(num)
         self.numbers = task.numbers(samples)
-        self._table, self._at = library.table, library.at
+        plan = kernels.make_plan(self.numbers, library.at, body_tree(task.robot))
+        self._plan = (*plan, library.table)
         self.figures = (*(f"reward/{n}" for n in task.terms), *(f"error/{n}" for n in task.errors))
         limits = task.config.termination
         configured = (
@@ -74,11 +77,11 @@ class CompiledTask:
         self.flag_rows = [*(k for k, there in enumerate(configured) if there), len(TESTS)]
         self.flags = (*(f"terminated/{TESTS[k]}" for k in self.flag_rows[:-1]), "diverged")
         noise = task.config.reset.noise
-        joints = len(task.soft_lower)
-        self._widths = None if noise is None else start_widths(noise, joints)
-        self._noisy = len(self.numbers.noise_width)
+        self._widths = np.empty((0, 0))
+        if noise is not None:
+            self._widths = start_widths(noise, len(task.soft_lower))[None]
+        self.draws = self._widths.shape[1]
         self.noise_share = 1.0
-        self._nothing = np.empty((0, 0))
         self._silence = np.empty((0, 0), np.float32)
 
     def settle(
@@ -108,36 +111,30 @@ class CompiledTask:
         num = simulation.num
         flags = np.empty((len(TESTS) + 4, num), bool)
         figures, reward = np.empty((len(self.figures), num)), np.empty(num)
-        terminated, truncated, done = flags[-3:]
-        noise, policy, critic = self._outputs(num, rng, out)
+        policy, critic = self._outputs(out)
         some, due = kernels.settle(
-            self.numbers,
-            self._at,
-            self._table,
-            simulation.kinematics.tree,
-            episodes.clocks,
+            *self._plan,
+            episodes.table,
             simulation.qpos,
             simulation.qvel,
+            *simulation.bodies(),
             episodes.default,
             action,
             episodes.action,
             simulation.history,
             object_active,
             diverged,
-            noise,
+            seed_of(rng),
+            self.noise_share,
             self._everyone,
-            simulation.bodies(),
             figures,
             flags,
             reward,
-            terminated,
-            truncated,
-            done,
             policy,
             critic,
         )
         episodes.action = action
-        return Judged(reward, terminated, truncated, done, figures, flags, some, due)
+        return Judged(reward, flags[5], flags[6], flags[7], figures, flags, some, due)
 
     def observe(
         self,
@@ -147,59 +144,69 @@ class CompiledTask:
         rng: np.random.Generator,
         out: Observation,
     ) -> None:
-        """Writes the observations of the simulations ``ids`` (K,) into their rows of ``out``."""
-        noise, policy, critic = self._outputs(len(ids), rng, out)
-        kernels.observe(
-            self.numbers,
-            self._at,
-            self._table,
-            episodes.rows,
-            simulation.qpos,
-            simulation.qvel,
-            simulation.bodies(),
-            episodes.default,
-            episodes.action,
-            noise,
-            ids,
-            policy,
-            critic,
-        )
+        """Writes the observations of the simulations ``ids`` (K,) into their rows of ``out``.
 
-    def start(
+        Their bodies are where they were last.
+        """
+        kernels.look(*self._seen(simulation, episodes, ids, rng, out))
+
+    def begin(
         self,
-        rows: np.ndarray,
-        rng: np.random.Generator,
+        simulation: Simulation,
+        episodes: Episodes,
         ids: np.ndarray,
-        qpos: np.ndarray,
-        qvel: np.ndarray,
-        share: np.ndarray | None = None,
+        draws: np.ndarray,
+        share: np.ndarray | None,
+        rng: np.random.Generator,
+        out: Observation,
     ) -> None:
-        """Writes start states into the rows ``ids`` (K,) of (N, nq) and (N, nv), disturbed.
+        """Puts the simulations ``ids`` (K,) into start states, disturbed, and observes them.
 
         Args:
-            rows: (K,) frames to start in, as rows of the library's table.
-            rng: Source of the disturbance.
+            simulation: The states, to write to.
+            episodes: Where the episodes are, started already.
             ids: (K,) simulations.
-            qpos: (N, nq) to write to.
-            qvel: (N, nv) to write to.
+            draws: (K, ``self.draws``) uniform in [0, 1), of the disturbance.
             share: (K,) share of the disturbance that each gets, all of it by default.
+            rng: Source of the observation's noise.
+            out: Observations of N simulations, to write to.
         """
-        draws = self._nothing if self._widths is None else symmetric(rng, len(ids), self._widths)
-        if share is not None and len(draws):
-            draws *= share[:, None]
-        kernels.start_states(self.numbers, self._at, self._table, rows, draws, ids, qpos, qvel)
+        widths = self._widths
+        if share is not None and len(widths):
+            widths = share[:, None] * widths
+        seen = self._seen(simulation, episodes, ids, rng, out)
+        kernels.begin(*seen, draws, widths)
 
-    def _outputs(
-        self, count: int, rng: np.random.Generator, out: Observation
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Noise of (count, W) numbers in [0, 1), and where to write."""
-        noise = self._silence
-        if self._noisy:
-            noise = rng.random((count, self._noisy), dtype=np.float32)
-            if self.noise_share < 1.0:
-                noise -= 0.5
-                noise *= self.noise_share
-                noise += 0.5
+    def _seen(
+        self,
+        simulation: Simulation,
+        episodes: Episodes,
+        ids: np.ndarray,
+        rng: np.random.Generator,
+        out: Observation,
+    ) -> tuple[Any, ...]:
+        """What the loops that observe take."""
+        return (
+            *self._plan,
+            episodes.table,
+            simulation.qpos,
+            simulation.qvel,
+            *simulation.bodies(),
+            episodes.default,
+            episodes.action,
+            seed_of(rng),
+            self.noise_share,
+            ids,
+            *self._outputs(out),
+        )
+
+    def _outputs(self, out: Observation) -> tuple[np.ndarray, np.ndarray]:
+        """Where to write."""
         if isinstance(out, dict):
-            return noise, out["policy"], out["critic"]
-        return noise, out, self._silence
+            return out["policy"], out["critic"]
+        return out, self._silence
+
+
+def seed_of(rng: np.random.Generator) -> int:
+    """Draws the seed of a control step's noise, which the loops take further."""
+    return int(rng.bit_generator.random_raw()) >> 1  # not negative as a signed number

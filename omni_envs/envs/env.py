@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from omni_envs.envs.batches import Observation, first_row
+from omni_envs.envs.batches import Observation, row_of
 from omni_envs.envs.options import UnexpectedOptionError
 from omni_envs.envs.vector_env import RENDER_MODES, OmniVectorEnv
 from omni_envs.errors import InvalidDataError
@@ -197,9 +197,9 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode; see ``OmniVectorEnv.reset`` for the options."""
         super().reset(seed=seed)
-        observations, _ = self.vector.reset(seed=seed, options=options)
+        self.vector.restart(seed, options)
         self._np_random = self.vector.np_random
-        return first_row(observations), self.vector.single_info()
+        return row_of(self.vector.observations), self.vector.single_info()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advances by a control step.
@@ -212,14 +212,14 @@ class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
         if action.shape != self.action_space.shape:
             expected = f"an array {self.action_space.shape}"
             raise InvalidDataError(owner, "action", expected, f"{action.shape}")
-        # The sum is finite if all entries are, and quicker to look at.
-        if not isfinite(action.sum()) and not np.isfinite(action).all():
+        # The product is finite if all entries are and none is huge, and quicker to look at.
+        if not isfinite(action.dot(action)) and not np.isfinite(action).all():
             bad = int(np.flatnonzero(~np.isfinite(action))[0])
             raise InvalidDataError(owner, f"action[{bad}]", "finite", f"{action[bad]}")
         vector = self.vector
         judged = vector.advance(action[None])
         return (
-            first_row(vector.observations),
+            row_of(vector.observations),
             judged.reward.item(),
             judged.terminated.item(),
             judged.truncated.item(),

@@ -12,9 +12,6 @@ from omni_envs.tracking import kernels
 from omni_envs.tracking.config import NoiseGrowth, TrackingConfig
 from omni_envs.tracking.motion import MotionLibrary
 
-NEVER = 2**62
-"""Control steps until a push that does not come."""
-
 GATE_EPISODES = 100
 """Finished episodes over which body tracking is judged."""
 
@@ -106,9 +103,9 @@ class NoiseLevel:
         growing = self._config is not None and self._config.observation
         return self.level if growing else 1.0
 
-    def draw(self, count: int, rng: np.random.Generator) -> np.ndarray | None:
-        """Draws (count,) shares of the noise, or None: all of it."""
-        return None if self._config is None else self.level * np.sqrt(rng.random(count))
+    def shares(self, draws: np.ndarray) -> np.ndarray | None:
+        """Returns (K,) shares of the noise, from (K,) draws in [0, 1), or None: all of it."""
+        return None if self._config is None else self.level * np.sqrt(draws)
 
 
 class Episodes:
@@ -122,7 +119,9 @@ class Episodes:
         action: (N, n) previous action.
         default: (N, n) default joint positions, randomization included, rad.
         rows: (N,) row of the library's table to track next.
-        clocks: All of these and the next pushes, in the form that the kernels move on.
+        table: (7, N) all of these and the next pushes, which the kernels move on.
+        clocks: Its rows by name.
+        draws: Numbers that the start of an episode takes.
 
     Args:
         library: The motions.
@@ -140,17 +139,23 @@ class Episodes:
         config: TrackingConfig,
         max_steps: int | None,
     ) -> None:
-        self._library, self._nominal, self._config = library, default, config
-        self._max_steps = max_steps
+        self._library, self._nominal = library, default
+        self._half = config.randomization.joint_default
+        self._most = kernels.NEVER if max_steps is None else max_steps
+        push = config.randomization.push
+        between = () if push is None else push.interval
+        self._between = np.array(between, float) / config.physics.control_step
         joints = len(default)
+        self.draws = 1 + joints
         self.action, self.default = np.zeros((num, joints)), np.tile(default, (num, 1))
         self.motion = np.zeros(num, int)
-        self.clocks = kernels.Clocks(*(np.zeros(num, int) for _ in kernels.Clocks._fields))
+        self.table = np.zeros((len(kernels.Clocks._fields), num), int)
+        self.clocks = kernels.Clocks(*self.table)
         self.rows, self.frame = self.clocks.rows, self.clocks.frame
         self.elapsed, self.possible = self.clocks.elapsed, self.clocks.possible
 
     def start(
-        self, ids: np.ndarray, motion: np.ndarray, frame: np.ndarray, rng: np.random.Generator
+        self, ids: np.ndarray, motion: np.ndarray, frame: np.ndarray, draws: np.ndarray
     ) -> None:
         """Starts episodes in frames of motions; the frames after them are to be tracked next.
 
@@ -158,33 +163,28 @@ class Episodes:
             ids: (K,) simulations.
             motion: (K,) motions.
             frame: (K,) frames that the simulations are put in.
-            rng: Source of chance.
+            draws: (K, ``self.draws``) uniform in [0, 1).
         """
-        self.motion[ids], self.frame[ids], self.elapsed[ids] = motion, frame + 1, 0
-        clocks = self.clocks
-        clocks.first[ids], clocks.last[ids] = (
-            self._library.starts[motion],
-            self._library.lengths[motion] - 1,
+        kernels.start_clocks(
+            self.table,
+            self._library.starts,
+            self._library.lengths,
+            motion,
+            frame,
+            self._most,
+            self._between,
+            self._nominal,
+            self._half,
+            draws,
+            ids,
+            self.motion,
+            self.default,
+            self.action,
         )
-        left = clocks.last[ids] - frame
-        self.possible[ids] = left if self._max_steps is None else np.minimum(left, self._max_steps)
-        self.rows[ids] = clocks.first[ids] + frame + 1
-        self.action[ids] = 0.0
-        half = self._config.randomization.joint_default
-        spread = (2.0 * rng.random((len(ids), len(self._nominal))) - 1.0) * half
-        self.default[ids] = self._nominal + spread
-        clocks.next_push[ids] = self._interval(len(ids), rng)
 
     def due_pushes(self, rng: np.random.Generator) -> np.ndarray:
         """Returns the simulations (K,) to push now, and draws when they are to be pushed next."""
         due = (self.clocks.next_push <= 0).nonzero()[0]
-        self.clocks.next_push[due] = self._interval(len(due), rng)
+        for i, draw in zip(due, rng.random(len(due)), strict=True):
+            self.clocks.next_push[i] = kernels.next_push(self._between, draw)
         return due
-
-    def _interval(self, count: int, rng: np.random.Generator) -> np.ndarray | int:
-        push = self._config.randomization.push
-        if push is None:
-            return NEVER
-        low, high = push.interval
-        seconds = low + (high - low) * rng.random(count)
-        return np.maximum(np.round(seconds / self._config.physics.control_step), 1).astype(int)

@@ -72,4 +72,8 @@ def body_tree(robot: Robot) -> kernels.Tree:
         anchor=model.jnt_pos[hinges],
         zero=model.qpos0[address],
         joint=np.asarray(address, int) - 7,
+        turned=np.array(
+            [not np.array_equal(model.body_quat[b], (1, 0, 0, 0)) for b in bodies], int
+        ),
+        aside=np.array(model.jnt_pos[hinges].any(axis=1), int),
     )

@@ -70,11 +70,20 @@ class Simulation:
         self.kinematics = BodyKinematics(robot, num)
         self._variants, self._fields = variants, variants.attach(self.batch)
         self.variant = np.zeros(num, int)
-        self._diverged, self.exploded = np.zeros(num, bool), False
+        self._diverged, self._spoilt, self.exploded = np.zeros(num, bool), False, False
         self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
-        self._rows = [
-            (_flat(variants.fields[name]), _flat(live)) for name, live in self._fields.items()
-        ]
+        # Nearly all of them are reals: a loop that copies these is as fast as memory.
+        self._live = tuple(_flat(a) for a in self._fields.values() if a.dtype == float)
+        self._live = self._live or (np.empty((num, 0)),)
+        values = {k: np.ascontiguousarray(variants.fields[k]) for k in self._fields}
+        pools = [_flat(v) for v in values.values() if v.dtype == float]
+        self._pool = np.concatenate(pools, axis=1) if pools else np.empty((1, 0))
+        self._others = []
+        for name, live in self._fields.items():
+            if live.dtype != float:
+                live[:] = values[name][0]
+                if (values[name] != values[name][0]).any():
+                    self._others.append((values[name], live))
         self._use_variants(np.arange(num), self.variant)
 
     def step(self) -> np.ndarray:
@@ -83,22 +92,22 @@ class Simulation:
         Returns:
             (N,) whether the simulation diverged. It is then back in the state before this step.
         """
-        qpos, qvel, warmstart = self._before
-        qpos[:], qvel[:], warmstart[:] = self.qpos, self.qvel, self._warmstart
+        kernels.copy_states(self.qpos, self.qvel, self._warmstart, *self._before)
         self.batch.step(nstep=self.substeps)
         # MuJoCo resets a simulation that blew up without a word, and only counts a warning.
-        diverged, warnings = np.empty(self.num, bool), self.batch.warning
+        diverged = np.empty(self.num, bool)
         self.exploded = kernels.exploded(
-            self.qpos, self.qvel, warnings, _BAD_STATE, SPEED_LIMIT, diverged
+            self.qpos, self.qvel, self.batch.warning, _BAD_STATE, SPEED_LIMIT, diverged
         )
         if self.exploded:
             self.qpos[diverged], self.qvel[diverged] = (a[diverged] for a in self._before[:2])
             self._warmstart[diverged] = 0.0
             self._diverged |= diverged
+            self._spoilt = True
         return diverged
 
     def reset(self, ids: np.ndarray, variant: np.ndarray) -> None:
-        """Readies simulations to start anew: write their states next, then ``place_bodies``.
+        """Readies simulations to start anew: write their states next.
 
         Args:
             ids: (K,) sorted indices of the simulations.
@@ -106,13 +115,12 @@ class Simulation:
         """
         # What a state consists of is written by us; MuJoCo's own reset, which costs more than all
         # of that, is for simulations that it has counted warnings of.
-        if self._diverged.any():
+        if self._spoilt:
             spoilt = ids[self._diverged[ids]]
             if len(spoilt):
                 self.batch.reset(spoilt, stage=_NOTHING)
                 self._diverged[spoilt] = False
-        self._warmstart[ids] = 0.0
-        self.variant[ids] = variant
+                self._spoilt = bool(self._diverged.any())
         self._use_variants(ids, variant)
 
     def place_bodies(self, ids: np.ndarray | None = None) -> None:
@@ -159,8 +167,9 @@ class Simulation:
             other.set_models([self._variants.models[v] for v in self.variant])
 
     def _use_variants(self, ids: np.ndarray, variant: np.ndarray) -> None:
-        for values, live in self._rows:
-            kernels.copy_rows(values, variant, ids, live)
+        kernels.exchange_models(self._pool, variant, ids, self._live, self.variant, self._warmstart)
+        for values, live in self._others:
+            live[ids] = values[variant]
         if self._variants.models:
             self.batch.set_models([self._variants.models[v] for v in self.variant])
 

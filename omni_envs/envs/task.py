@@ -35,6 +35,7 @@ class TrackingTask:
 
     Attributes:
         config: The numbers.
+        robot: The robot.
         terms: Names of the reward terms.
         errors: Names of the tracking errors.
         anchor: Index of the anchor among the tracked bodies.
@@ -50,7 +51,7 @@ class TrackingTask:
     """
 
     def __init__(self, robot: Robot, config: TrackingConfig, has_object: bool) -> None:
-        self.config, self._robot, self._has_object = config, robot, has_object
+        self.config, self.robot, self._has_object = config, robot, has_object
         names = robot.tracked_bodies
         anchor = robot.anchor_body if config.anchor == "pelvis" else robot.torso_body
         for body in (anchor, *robot.end_effectors):
@@ -96,7 +97,7 @@ class TrackingTask:
         Args:
             samples: Physics steps that a contact sensor remembers.
         """
-        config, robot = self.config, self._robot
+        config, robot = self.config, self.robot
         limits = config.termination
         oriented = np.ones(len(robot.tracked_bodies), bool)
         if self._oriented is not None:
@@ -264,7 +265,7 @@ class TrackingTask:
             base_linear_velocity=qvel[:, :3],
             base_angular_velocity=qvel[:, 3:6],
             joint_position=qpos[:, joints] - default,
-            joint_velocity=qvel[:, 6 : self._robot.nv],
+            joint_velocity=qvel[:, 6 : self.robot.nv],
             action=action,
             bodies=bodies,
             object_pose=qpos[:, self._object] if self._has_object else None,

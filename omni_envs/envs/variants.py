@@ -13,6 +13,7 @@ from omni_envs.envs.model import EnvModel
 from omni_envs.errors import InvalidDataError, InvalidOptionError
 from omni_envs.robots import Robot
 from omni_envs.scenes import OBJECT, Box, SceneObject
+from omni_envs.tracking import kernels
 from omni_envs.tracking.config import ObjectRandomization, RandomizationConfig
 from omni_envs.tracking.randomization import scaled_inertia, symmetric
 
@@ -62,9 +63,20 @@ class ModelVariants:
         else:
             self.fields = _differing_fields(env_models[0].model, pools[0])
 
-    def choose(self, scene: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Draws (K,) variants for episodes in scenes (K,)."""
-        return scene * self.count + rng.integers(self.count, size=len(scene))
+    def choose(self, scenes: np.ndarray, motions: np.ndarray, draws: np.ndarray) -> np.ndarray:
+        """Draws variants for episodes.
+
+        Args:
+            scenes: (M,) scenes of all motions.
+            motions: (K,) motions of the episodes.
+            draws: (K,) uniform in [0, 1).
+
+        Returns:
+            (K,) indices of variants.
+        """
+        chosen = np.empty(len(motions), int)
+        kernels.choose_models(scenes, motions, self.count, draws, chosen)
+        return chosen
 
     def attach(self, simulations: batch.Batch) -> dict[str, np.ndarray]:
         """Gives every differing field one value per simulation; returns the live arrays.

@@ -17,6 +17,7 @@ from omni_envs.envs.batches import (
     batched_infos,
     copied,
     empty_observations,
+    masked_names,
     observation_space,
 )
 from omni_envs.envs.compiled import CompiledTask, Judged
@@ -53,6 +54,9 @@ RESET_OPTIONS = ("reset_mask", "motion", "frame")
 """Options of ``reset``."""
 
 Options = Mapping[str, Any]
+
+PLACE = ("motion", "frame")
+"""Infos that a start has, too."""
 
 RENDER_MODES = ("rgb_array",)
 """Values of ``render_mode`` beside None."""
@@ -200,6 +204,8 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         if targets is not None:
             self._lead = (targets - self.robot.default_joint_array) / self._scale
         self._started = False
+        self._info_names = (*self._task.figures, *self._task.flags, *PLACE)
+        self._info_keys, self._place_keys = map(masked_names, (self._info_names, PLACE))
         self.policy_layout, self.critic_layout = plain.policy_layout, plain.critic_layout
         critic = self.critic_layout.size if config.observation.privileged else None
         self.single_observation_space = observation_space(self.policy_layout.size, critic)
@@ -255,6 +261,14 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         Returns:
             Observations of all simulations, and infos.
         """
+        self.restart(seed, options)
+        everyone = np.ones(self.num_envs, bool)
+        return copied(self.observations), batched_infos(self._place_keys, self._place(), everyone)
+
+    def restart(
+        self, seed: int | list[int | None] | None = None, options: Options | None = None
+    ) -> None:
+        """Does what ``reset`` does; what comes next is in ``observations``."""
         if seed is not None:
             value = seed if isinstance(seed, int | np.integer) else merged_seed(seed)
             self._np_random, self._np_random_seed = seeding.np_random(int(value))
@@ -278,7 +292,6 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             ids = np.flatnonzero(mask)
         self._start(ids, **options)
         self._started = True
-        return copied(self.observations), batched_infos(self._place())
 
     def step(
         self, actions: np.ndarray
@@ -301,11 +314,15 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
                 type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"
             )
         judged = self.advance(actions)
-        infos = batched_infos(self._infos(judged) | self._place())
+        flags = judged.flags
+        rows = [*judged.figures, *(flags[k] for k in self._task.flag_rows), *self._place()]
+        infos = batched_infos(self._info_keys, rows, np.ones(self.num_envs, bool))
         if judged.some_done and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            infos = add_finals(infos, self.observations, judged.done)
-            self._start(judged.done.nonzero()[0])
-            infos |= self._place()
+            done = judged.done.copy()
+            final_info = batched_infos(self._info_keys, rows, done)
+            add_finals(infos, final_info, self.observations, done)
+            self._start(done.nonzero()[0])
+            infos.update(zip(PLACE, self._place(), strict=True))
         observations = copied(self.observations)
         return observations, judged.reward, judged.terminated, judged.truncated, infos
 
@@ -320,20 +337,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         if not self._started:
             raise InvalidOptionError("step: call reset first.")
         episodes, simulation = self._episodes, self.simulation
-        # From here on an action is the standard one of the same joint target: rewards and the
-        # observed previous action then mean the same in all modes, and for an exported policy.
-        action, bad = np.empty_like(actions), np.empty(self.num_envs, bool)
-        some_bad = kernels.joint_targets(
-            actions,
-            self.config.action.limit,
-            self._lead,
-            episodes.rows,
-            episodes.default,
-            self._scale,
-            action,
-            simulation.ctrl,
-            bad,
-        )
+        action, bad, some_bad = self.aim(actions)
         diverged = simulation.step()
         if some_bad or simulation.exploded:
             diverged |= bad
@@ -360,6 +364,32 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         if judged.push_due:
             self._push(judged.done)
         return judged
+
+    def aim(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Writes the joint targets of actions into the simulations.
+
+        Args:
+            actions: (N, n) float64.
+
+        Returns:
+            (N, n) standard actions with the same joint targets: what is rewarded and observed means
+            the same in all modes, and for an exported policy; (N,) which actions are NaN or
+            infinite, and count as zero; whether any is.
+        """
+        episodes = self._episodes
+        action, bad = np.empty_like(actions), np.empty(self.num_envs, bool)
+        some_bad = kernels.joint_targets(
+            actions,
+            self.config.action.limit,
+            self._lead,
+            episodes.rows,
+            episodes.default,
+            self._scale,
+            action,
+            self.simulation.ctrl,
+            bad,
+        )
+        return action, bad, some_bad
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Returns one (height, width, 3) uint8 picture per simulation, the reference as a ghost."""
@@ -388,18 +418,17 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         """Puts simulations into start frames, drawn where not given, and observes them."""
         if not len(ids):
             return
-        rng, count = self.np_random, len(ids)
-        motions, places = self.sampler.draw(count, rng)
+        rng, task, episodes = self.np_random, self._task, self._episodes
+        # All chance of a start in one draw: frame, model, share of the noise, clocks, state.
+        draws = rng.random((len(ids), 4 + episodes.draws + task.draws))
+        motions, places = self.sampler.draw(draws[:, :2])
         if frame is not None or motion is not None:
-            motions, places = self._library.places(motion, frame, count)
-        simulation = self.simulation
-        simulation.reset(ids, self._variants.choose(self._scene_of[motions], rng))
-        start = self._library.starts[motions] + places
-        share = self._noise.draw(count, rng)
-        self._task.start(start, rng, ids, simulation.qpos, simulation.qvel, share)
-        simulation.place_bodies(ids)
-        self._episodes.start(ids, motions, places, rng)
-        self._observe(ids)
+            motions, places = self._library.places(motion, frame, len(ids))
+        simulation, rest = self.simulation, 4 + episodes.draws
+        simulation.reset(ids, self._variants.choose(self._scene_of, motions, draws[:, 2]))
+        episodes.start(ids, motions, places, draws[:, 4:rest])
+        share = self._noise.shares(draws[:, 3])
+        task.begin(simulation, episodes, ids, draws[:, rest:], share, rng, self.observations)
 
     def _push(self, done: np.ndarray) -> None:
         due, config = self._episodes.due_pushes(self.np_random), self.config.randomization.push
@@ -413,27 +442,19 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
     def _observe(self, ids: np.ndarray) -> None:
         self._task.observe(self.simulation, self._episodes, ids, self.np_random, self.observations)
 
-    def _infos(self, judged: Judged) -> dict[str, np.ndarray]:
-        values = dict(zip(self._task.figures, judged.figures, strict=True))
-        rows = self._task.flag_rows
-        return values | {
-            name: judged.flags[k] for name, k in zip(self._task.flags, rows, strict=True)
-        }
-
-    def _place(self) -> dict[str, np.ndarray]:
-        return {"motion": self._episodes.motion.copy(), "frame": self._episodes.frame.copy()}
+    def _place(self) -> list[np.ndarray]:
+        return [self._episodes.motion.copy(), self._episodes.frame.copy()]
 
     def single_info(self, judged: Judged | None = None) -> dict[str, Any]:
         """Returns the infos of the first simulation as plain numbers, of a step or of a start."""
-        info: dict[str, Any] = {}
-        if judged is not None:
-            task = self._task
-            info.update(zip(task.figures, judged.figures[:, 0].tolist(), strict=True))
-            flags = judged.flags[:, 0].tolist()
-            info.update(zip(task.flags, [flags[k] for k in task.flag_rows], strict=True))
         episodes = self._episodes
-        info["motion"], info["frame"] = episodes.motion[0].item(), episodes.frame[0].item()
-        return info
+        place = [episodes.motion.item(0), episodes.frame.item(0)]
+        if judged is None:
+            return dict(zip(PLACE, place, strict=True))
+        flags = judged.flags[:, 0].tolist()
+        values = judged.figures[:, 0].tolist()
+        values += [flags[k] for k in self._task.flag_rows]
+        return dict(zip(self._info_names, values + place, strict=True))
 
     def _record_divergence(self, ids: np.ndarray) -> None:
         for i in ids:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from omni_envs.tracking import kernels
 from omni_envs.tracking.config import ResetConfig
 from omni_envs.tracking.motion import MotionLibrary
 
@@ -29,18 +30,21 @@ class MotionSampler:
         self.config = config
         # An episode needs one more frame after its first to track.
         self._last_start = library.lengths - 2
-        self._uniform_ends = np.cumsum(library.lengths - 1)
-        self._starts = library.starts
         counts = library.lengths // BIN_FRAMES + 1
         self.bin_motion = np.repeat(np.arange(library.num_motions), counts)
         within = np.concatenate([np.arange(c) for c in counts])
         length, count = library.lengths[self.bin_motion], counts[self.bin_motion]
         # Bin edges as shares of the motion's frames, so that all bins of a motion are equally long.
-        self._low = within * (length - 1) / count
-        self._width = (length - 1) / count
+        low, width = within * (length - 1) / count, (length - 1) / count
         self._first_bin = np.concatenate([[0], np.cumsum(counts)[:-1]])
         self._bins_per_frame = counts / (library.lengths - 1)
         self._counts = counts
+        # Stretches of motion to draw from: motion, first frame, frames.
+        self._cells = (self.bin_motion, low, width)
+        if not self.adapts:
+            motions = np.arange(library.num_motions)
+            frames = 0 if config.start == "start" else library.lengths - 1
+            self._cells = (motions, np.zeros(len(motions)), np.zeros(len(motions)) + frames)
         self.reset()
 
     def reset(self) -> None:
@@ -98,29 +102,26 @@ class MotionSampler:
         top = int(p.argmax())
         return {"entropy": float(entropy), "top_probability": float(p[top]), "top_bin": float(top)}
 
-    def draw(self, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    def draw(self, draws: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Draws start frames.
 
         Args:
-            count: How many.
-            rng: Source of chance.
+            draws: (K, 2) uniform in [0, 1).
 
         Returns:
-            (count,) motions and (count,) frames within them, at most the last but one.
+            (K,) motions and (K,) frames within them, at most the last but one.
         """
-        if self.config.start == "adaptive":
-            if self._cumulative is None:
-                self._cumulative = np.cumsum(self.probabilities())
-            bins = np.searchsorted(self._cumulative, rng.random(count), side="right")
-            bins = np.minimum(bins, self.num_bins - 1)
-            motion = self.bin_motion[bins]
-            frame = self._low[bins] + rng.random(count) * self._width[bins]
-            return motion, np.minimum(frame.astype(int), self._last_start[motion])
+        if self._cumulative is None:
+            self._cumulative = np.cumsum(self._shares())
+        motion, frame = np.empty((2, len(draws)), int)
+        kernels.draw_frames(self._cumulative, *self._cells, self._last_start, draws, motion, frame)
+        return motion, frame
+
+    def _shares(self) -> np.ndarray:
+        """How likely the stretches of motion are that start frames are drawn from."""
+        if self.adapts:
+            return self.probabilities()
         if self.config.start == "start":
-            motion = rng.integers(len(self._starts), size=count)
-            return motion, np.zeros(count, int)
+            return np.full(len(self._last_start), 1.0 / len(self._last_start))
         # Uniform over all start frames of all motions: long motions are drawn more often.
-        ends = self._uniform_ends
-        place = rng.integers(ends[-1], size=count)
-        motion = np.searchsorted(ends, place, side="right")
-        return motion, place - (ends[motion] - (self._last_start[motion] + 1))
+        return (self._last_start + 1) / (self._last_start + 1).sum()

@@ -17,7 +17,8 @@ def start(library, num=3000, max_steps=500, **options):
     config = make_config(**options)
     episodes = Episodes(library, G1.default_joint_array, num, config, max_steps)
     rng = np.random.default_rng(0)
-    episodes.start(np.arange(num), np.zeros(num, int), np.full(num, 10), rng)
+    draws = rng.random((num, episodes.draws))
+    episodes.start(np.arange(num), np.zeros(num, int), np.full(num, 10), draws)
     return episodes, rng
 
 
@@ -25,7 +26,7 @@ def count(episodes):
     """Moves on by a control step; returns (N,) which episodes lack motion or time."""
     num = len(episodes.motion)
     truncated, done = np.empty(num, bool), np.empty(num, bool)
-    kernels.advance(episodes.clocks, np.zeros(num, bool), truncated, done)
+    kernels.advance(episodes.clocks, np.zeros(num, bool), np.arange(num), truncated, done)
     np.testing.assert_array_equal(truncated, done)
     return truncated
 
@@ -34,7 +35,8 @@ def test_the_frame_after_the_start_is_tracked_first(library):
     episodes, _ = start(library, 2)
     assert episodes.frame.tolist() == [11, 11]
     assert episodes.rows.tolist() == [11, 11]
-    episodes.start(np.array([1]), np.array([1]), np.array([4]), np.random.default_rng(0))
+    draws = np.random.default_rng(0).random((1, episodes.draws))
+    episodes.start(np.array([1]), np.array([1]), np.array([4]), draws)
     assert episodes.rows.tolist() == [11, 125]
 
 
@@ -61,7 +63,8 @@ def test_joint_default_is_offset_per_episode(library):
     assert np.abs(offset).max() <= 0.01
     np.testing.assert_allclose(np.quantile(offset, [0.1, 0.9]), [-0.008, 0.008], atol=3e-4)
     kept = episodes.default[1:].copy()
-    episodes.start(np.array([0]), np.array([0]), np.array([0]), rng)
+    draws = rng.random((1, episodes.draws))
+    episodes.start(np.array([0]), np.array([0]), np.array([0]), draws)
     assert (episodes.default[0] != G1.default_joint_array + offset[0]).all()
     np.testing.assert_array_equal(episodes.default[1:], kept)
 
@@ -114,14 +117,14 @@ def test_start_noise_grows_with_what_episodes_last():
         level.record(np.full(GATE_EPISODES, 10), np.full(GATE_EPISODES, 10))
     assert level.level == 1.0
     rng = np.random.default_rng(0)
-    share = level.draw(4000, rng)
+    share = level.shares(rng.random(4000))
     np.testing.assert_allclose(np.quantile(share**2, [0.1, 0.5, 0.9]), [0.1, 0.5, 0.9], atol=0.03)
     level.reset()
-    assert not level.draw(5, rng).any()
+    assert not level.shares(rng.random(5)).any()
 
 
 def test_start_noise_that_does_not_grow_is_whole():
     level = NoiseLevel(None)
     level.record(np.zeros(500), np.ones(500))
     assert level.level == 1.0
-    assert level.draw(5, np.random.default_rng(0)) is None
+    assert level.shares(np.full(5, 0.5)) is None

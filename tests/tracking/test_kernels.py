@@ -30,8 +30,45 @@ def test_explosions_are_warnings_speeds_and_nan():
     assert out.tolist() == [False, True, True, True, True]
 
 
-def test_rows_are_copied_where_asked():
-    source, out = np.arange(12.0).reshape(4, 3), np.zeros((5, 3))
-    kernels.copy_rows(source, np.array([3, 0]), np.array([1, 4]), out)
-    np.testing.assert_array_equal(out[[1, 4]], source[[3, 0]])
-    assert not out[[0, 2, 3]].any()
+def test_models_are_exchanged_where_asked():
+    source = np.arange(20.0).reshape(4, 5)
+    out, model, warmstart = (np.zeros((5, 3)), np.zeros((5, 2))), np.full(5, 2), np.ones((5, 2))
+    kernels.exchange_models(source, np.array([3, 0]), np.array([1, 4]), out, model, warmstart)
+    whole = np.concatenate(out, axis=1)
+    np.testing.assert_array_equal(whole[[1, 4]], source[[3, 0]])
+    assert not whole[[0, 2, 3]].any()
+    assert model.tolist() == [2, 3, 2, 2, 0]
+    assert warmstart[:, 0].tolist() == [1, 0, 1, 1, 0]
+
+
+def test_models_are_drawn_from_those_of_the_scene():
+    chosen = np.empty(4, int)
+    draws = np.array([0.0, 0.24, 0.25, 1.0 - 2.0**-53])
+    kernels.choose_models(np.array([0, 2, 1]), np.array([0, 1, 2, 1]), 4, draws, chosen)
+    assert chosen.tolist() == [0, 8, 5, 11]
+
+
+def test_sines_are_exact_to_a_rounding():
+    angles = np.random.default_rng(0).uniform(-20.0, 20.0, 10_000)
+    angles[:3] = 0.0, np.pi / 4, 1e6
+    sines, cosines = np.empty((2, 10_000))
+    kernels.sines(angles, sines, cosines)
+    np.testing.assert_allclose(sines, np.sin(angles), rtol=0, atol=2.3e-16)
+    np.testing.assert_allclose(cosines, np.cos(angles), rtol=0, atol=2.3e-16)
+
+
+def test_chance_is_uniform_and_without_memory():
+    """Ten streams, each step's seed next to the last's: the hardest case for a counter."""
+    draws = np.array([[kernels.uniform(seed, k) for k in range(5000)] for seed in range(10)])
+    assert draws.min() >= 0.0 and draws.max() < 1.0
+    np.testing.assert_allclose(
+        np.quantile(draws, [0.1, 0.25, 0.5, 0.75, 0.9], axis=1).mean(axis=1),
+        [0.1, 0.25, 0.5, 0.75, 0.9],
+        atol=0.005,
+    )
+    centred = (draws - 0.5) * np.sqrt(12.0)
+    # Standard error of a correlation of n pairs: n^-1/2.
+    assert np.abs(np.corrcoef(draws) - np.eye(10)).max() < 5 / np.sqrt(5000)
+    for lag in (1, 2, 70):
+        pairs = centred[:, lag:] * centred[:, :-lag]
+        assert abs(pairs.mean()) < 5 / np.sqrt(pairs.size)
