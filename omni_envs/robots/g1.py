@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 
-from omni_envs.robots.robot import SIDES, Actuator, BodyPoint, Foot, Robot
+from omni_envs.robots.robot import SIDES, BodyPoint, Foot, Robot
+from omni_envs.robots.tables import Drive, both, contact_links, limb, same
 
 # Gains place every joint's undamped frequency at 10 Hz on the rotor inertia alone, damping ratio 2:
 # kp = J ω², kd = 2 ζ J ω (BeyondMimic, arXiv 2508.08241).
@@ -14,33 +14,20 @@ _FREQUENCY = 2.0 * pi * 10.0  # rad/s
 _DAMPING_RATIO = 2.0
 
 
-@dataclass(frozen=True)
-class _Motor:
-    """A motor with its gearbox: reflected inertia kg m², torque limit N m, speed limit rad/s."""
-
-    armature: float
-    effort: float
-    speed: float
-
-    def drive(self, joint: str) -> Actuator:
-        return Actuator(
-            joint,
-            stiffness=self.armature * _FREQUENCY**2,
-            damping=2.0 * _DAMPING_RATIO * self.armature * _FREQUENCY,
-            effort=self.effort,
-            velocity_limit=self.speed,
-            armature=self.armature,
-        )
+def _motor(armature: float, effort: float, speed: float) -> Drive:
+    stiffness = armature * _FREQUENCY**2
+    damping = 2.0 * _DAMPING_RATIO * armature * _FREQUENCY
+    return Drive(effort, speed, stiffness, damping, armature)
 
 
 # Armature of a two-stage planetary drive: J = r0 (g1 g2)² + r1 g2² + r2, with rotor inertias r and
 # gear ratios g of the motor; the values are those of mjlab's Unitree G1.
-_7520_14 = _Motor(armature=0.010177520, effort=88.0, speed=32.0)
-_7520_22 = _Motor(armature=0.025101925, effort=139.0, speed=20.0)
-_5020 = _Motor(armature=0.003609725, effort=25.0, speed=37.0)
-_4010 = _Motor(armature=0.00425, effort=5.0, speed=22.0)
+_7520_14 = _motor(armature=0.010177520, effort=88.0, speed=32.0)
+_7520_22 = _motor(armature=0.025101925, effort=139.0, speed=20.0)
+_5020 = _motor(armature=0.003609725, effort=25.0, speed=37.0)
+_4010 = _motor(armature=0.00425, effort=5.0, speed=22.0)
 # Two 5020 motors drive each ankle, and the upper waist, through four-bar linkages: taken as a sum.
-_2X5020 = _Motor(armature=0.00721945, effort=50.0, speed=37.0)
+_2X5020 = _motor(armature=0.00721945, effort=50.0, speed=37.0)
 
 _LEG = {
     "hip_pitch": _7520_14,
@@ -62,22 +49,14 @@ _ARM = {
 }
 
 
-def _limb(side: str, motors: dict[str, _Motor]) -> tuple[Actuator, ...]:
-    return tuple(motor.drive(f"{side}_{joint}_joint") for joint, motor in motors.items())
-
-
+_JOINT = "{side}_{joint}_joint"
 _ACTUATORS = (
-    *_limb("left", _LEG),
-    *_limb("right", _LEG),
-    *(motor.drive(f"{joint}_joint") for joint, motor in _WAIST.items()),
-    *_limb("left", _ARM),
-    *_limb("right", _ARM),
+    *limb(_JOINT, "left", _LEG),
+    *limb(_JOINT, "right", _LEG),
+    *(motor.actuator(f"{joint}_joint") for joint, motor in _WAIST.items()),
+    *limb(_JOINT, "left", _ARM),
+    *limb(_JOINT, "right", _ARM),
 )
-
-
-def _both(**joints: float) -> dict[str, float]:
-    """Joint values that are the same on both sides."""
-    return {f"{side}_{joint}_joint": value for side in SIDES for joint, value in joints.items()}
 
 
 def _keypoints() -> dict[str, BodyPoint]:
@@ -117,31 +96,24 @@ G1 = Robot(
     # The published 0.76 leaves the soles 3 mm in the air.
     default_root_height=0.757,
     default_joint_positions={
-        **_both(hip_pitch=-0.312, knee=0.669, ankle_pitch=-0.363, shoulder_pitch=0.2, elbow=0.6),
+        **same(
+            _JOINT, hip_pitch=-0.312, knee=0.669, ankle_pitch=-0.363, shoulder_pitch=0.2, elbow=0.6
+        ),
         "left_shoulder_roll_joint": 0.2,
         "right_shoulder_roll_joint": -0.2,
     },
     keypoints=_keypoints(),
     feet={side: Foot(f"{side}_ankle_roll_link", _SOLE) for side in SIDES},
-    contact_links={
-        f"{side}_{link}": bodies
-        for side in SIDES
-        for link, bodies in (
-            ("hand", (f"{side}_wrist_yaw_link",)),
-            ("foot", (f"{side}_ankle_roll_link",)),
-            ("knee", (f"{side}_knee_link",)),
-        )
-    },
+    contact_links=contact_links(
+        hand="{side}_wrist_yaw_link", foot="{side}_ankle_roll_link", knee="{side}_knee_link"
+    ),
     tracked_bodies=(
         "pelvis",
-        *(f"{s}_{b}_link" for s in SIDES for b in ("hip_roll", "knee", "ankle_roll")),
+        *both("{side}_hip_roll_link", "{side}_knee_link", "{side}_ankle_roll_link"),
         "torso_link",
-        *(f"{s}_{b}_link" for s in SIDES for b in ("shoulder_roll", "elbow", "wrist_yaw")),
+        *both("{side}_shoulder_roll_link", "{side}_elbow_link", "{side}_wrist_yaw_link"),
     ),
-    end_effectors=(
-        *(f"{s}_ankle_roll_link" for s in SIDES),
-        *(f"{s}_wrist_yaw_link" for s in SIDES),
-    ),
+    end_effectors=(*both("{side}_ankle_roll_link"), *both("{side}_wrist_yaw_link")),
     # OmniRetarget's, narrower than the mechanics: the torso stays upright. Its wrists are as good
     # as locked, too, which lets no palm lie on what it touches: contact points are off by a quarter
     # more, and climbs cost a fifth more deformation energy. Ours bend where that is of use.
@@ -153,6 +125,6 @@ G1 = Robot(
     posture_weights={
         "waist_yaw_joint": 0.2,
         "waist_roll_joint": 0.2,
-        **_both(wrist_roll=0.02, wrist_pitch=0.02, wrist_yaw=0.02),
+        **same(_JOINT, wrist_roll=0.02, wrist_pitch=0.02, wrist_yaw=0.02),
     },
 )

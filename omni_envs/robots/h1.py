@@ -2,62 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
-from omni_envs.robots.robot import SIDES, Actuator, BodyPoint, Foot, Robot
+from omni_envs.robots.robot import SIDES, BodyPoint, Foot, Robot
+from omni_envs.robots.tables import Drive, both, contact_links, limb, same
 
 _ARMATURE = 0.1  # kg m², of MuJoCo Menagerie; the manufacturer publishes none
 
 
-@dataclass(frozen=True)
-class _Drive:
-    """A joint's drive: torque limit N m, speed limit rad/s, gains N m / rad and N m s / rad."""
-
-    effort: float
-    speed: float
-    stiffness: float
-    damping: float
-
-    def drive(self, joint: str) -> Actuator:
-        return Actuator(joint, self.stiffness, self.damping, self.effort, self.speed, _ARMATURE)
+def _drive(effort: float, speed: float, stiffness: float, damping: float) -> Drive:
+    return Drive(effort, speed, stiffness, damping, _ARMATURE)
 
 
 # The manufacturer's gains (unitree_rl_lab): H1 has no published rotor inertias to derive gains of a
 # given frequency from.
-_HIP = _Drive(effort=200.0, speed=23.0, stiffness=150.0, damping=2.0)
-_TORSO = _Drive(effort=200.0, speed=23.0, stiffness=300.0, damping=6.0)
+_HIP = _drive(effort=200.0, speed=23.0, stiffness=150.0, damping=2.0)
+_TORSO = _drive(effort=200.0, speed=23.0, stiffness=300.0, damping=6.0)
 _LEG = {
     "hip_yaw": _HIP,
     "hip_roll": _HIP,
     "hip_pitch": _HIP,
-    "knee": _Drive(effort=300.0, speed=14.0, stiffness=200.0, damping=4.0),
-    "ankle": _Drive(effort=40.0, speed=9.0, stiffness=40.0, damping=2.0),
+    "knee": _drive(effort=300.0, speed=14.0, stiffness=200.0, damping=4.0),
+    "ankle": _drive(effort=40.0, speed=9.0, stiffness=40.0, damping=2.0),
 }
 _ARM = {
-    "shoulder_pitch": _Drive(effort=40.0, speed=9.0, stiffness=100.0, damping=2.0),
-    "shoulder_roll": _Drive(effort=40.0, speed=9.0, stiffness=50.0, damping=2.0),
-    "shoulder_yaw": _Drive(effort=18.0, speed=20.0, stiffness=50.0, damping=2.0),
-    "elbow": _Drive(effort=18.0, speed=20.0, stiffness=50.0, damping=2.0),
+    "shoulder_pitch": _drive(effort=40.0, speed=9.0, stiffness=100.0, damping=2.0),
+    "shoulder_roll": _drive(effort=40.0, speed=9.0, stiffness=50.0, damping=2.0),
+    "shoulder_yaw": _drive(effort=18.0, speed=20.0, stiffness=50.0, damping=2.0),
+    "elbow": _drive(effort=18.0, speed=20.0, stiffness=50.0, damping=2.0),
 }
 
 
-def _limb(side: str, drives: dict[str, _Drive]) -> tuple[Actuator, ...]:
-    return tuple(drive.drive(f"{side}_{joint}") for joint, drive in drives.items())
-
-
+_JOINT = "{side}_{joint}"
 _ACTUATORS = (
-    *_limb("left", _LEG),
-    *_limb("right", _LEG),
-    _TORSO.drive("torso"),
-    *_limb("left", _ARM),
-    *_limb("right", _ARM),
+    *limb(_JOINT, "left", _LEG),
+    *limb(_JOINT, "right", _LEG),
+    _TORSO.actuator("torso"),
+    *limb(_JOINT, "left", _ARM),
+    *limb(_JOINT, "right", _ARM),
 )
-
-
-def _both(**joints: float) -> dict[str, float]:
-    """Joint values that are the same on both sides."""
-    return {f"{side}_{joint}": value for side in SIDES for joint, value in joints.items()}
 
 
 def _keypoints() -> dict[str, BodyPoint]:
@@ -95,29 +78,20 @@ H1 = Robot(
     torso_body="torso_link",
     actuators=_ACTUATORS,
     default_root_height=1.03423,
-    default_joint_positions=_both(
-        hip_pitch=-0.1, knee=0.3, ankle=-0.2, shoulder_pitch=0.2, elbow=0.32
+    default_joint_positions=same(
+        _JOINT, hip_pitch=-0.1, knee=0.3, ankle=-0.2, shoulder_pitch=0.2, elbow=0.32
     ),
     keypoints=_keypoints(),
     feet={side: Foot(f"{side}_ankle_link", _SOLE) for side in SIDES},
-    contact_links={
-        f"{side}_{link}": bodies
-        for side in SIDES
-        for link, bodies in (
-            ("hand", (f"{side}_elbow_link",)),
-            ("foot", (f"{side}_ankle_link",)),
-            ("knee", (f"{side}_knee_link",)),
-        )
-    },
+    contact_links=contact_links(
+        hand="{side}_elbow_link", foot="{side}_ankle_link", knee="{side}_knee_link"
+    ),
     tracked_bodies=(
         "pelvis",
-        *(f"{s}_{b}_link" for s in SIDES for b in ("hip_pitch", "knee", "ankle")),
+        *both("{side}_hip_pitch_link", "{side}_knee_link", "{side}_ankle_link"),
         "torso_link",
-        *(f"{s}_{b}_link" for s in SIDES for b in ("shoulder_roll", "shoulder_yaw", "elbow")),
+        *both("{side}_shoulder_roll_link", "{side}_shoulder_yaw_link", "{side}_elbow_link"),
     ),
-    end_effectors=(
-        *(f"{s}_ankle_link" for s in SIDES),
-        *(f"{s}_elbow_link" for s in SIDES),
-    ),
+    end_effectors=(*both("{side}_ankle_link"), *both("{side}_elbow_link")),
     posture_weights={"torso": 0.2},
 )

@@ -2,78 +2,57 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
-from omni_envs.robots.robot import SIDES, Actuator, BodyPoint, Foot, Robot
+from omni_envs.robots.robot import SIDES, BodyPoint, Foot, Robot
+from omni_envs.robots.tables import Drive, both, contact_links, limb, same, sided
 
 _ARMATURE = 0.03  # kg m², as in holosoma; the manufacturer publishes none
 
 
-@dataclass(frozen=True)
-class _Drive:
-    """A joint's drive: torque limit N m, speed limit rad/s, gains N m / rad and N m s / rad."""
-
-    effort: float
-    speed: float
-    stiffness: float
-    damping: float
-
-    def drive(self, joint: str) -> Actuator:
-        return Actuator(joint, self.stiffness, self.damping, self.effort, self.speed, _ARMATURE)
+def _drive(effort: float, speed: float, stiffness: float, damping: float) -> Drive:
+    return Drive(effort, speed, stiffness, damping, _ARMATURE)
 
 
 # Gains of holosoma's T1: there are no published rotor inertias to derive gains of a given
 # frequency from. Stiff gains on small motors: the legs' action scales are a tenth of the G1's.
-_HEAD = _Drive(effort=7.0, speed=12.56, stiffness=5.0, damping=0.5)
-_ARM = _Drive(effort=18.0, speed=18.84, stiffness=20.0, damping=0.5)
-_WAIST = _Drive(effort=30.0, speed=10.88, stiffness=200.0, damping=5.0)
-_HIP = _Drive(effort=30.0, speed=10.9, stiffness=200.0, damping=5.0)
+_HEAD = _drive(effort=7.0, speed=12.56, stiffness=5.0, damping=0.5)
+_ARM = _drive(effort=18.0, speed=18.84, stiffness=20.0, damping=0.5)
+_WAIST = _drive(effort=30.0, speed=10.88, stiffness=200.0, damping=5.0)
+_HIP = _drive(effort=30.0, speed=10.9, stiffness=200.0, damping=5.0)
 _LEG = {
-    "Hip_Pitch": _Drive(effort=45.0, speed=12.5, stiffness=200.0, damping=5.0),
+    "Hip_Pitch": _drive(effort=45.0, speed=12.5, stiffness=200.0, damping=5.0),
     "Hip_Roll": _HIP,
     "Hip_Yaw": _HIP,
-    "Knee_Pitch": _Drive(effort=60.0, speed=11.7, stiffness=200.0, damping=5.0),
-    "Ankle_Pitch": _Drive(effort=20.0, speed=18.8, stiffness=50.0, damping=3.0),
-    "Ankle_Roll": _Drive(effort=15.0, speed=12.4, stiffness=50.0, damping=3.0),
+    "Knee_Pitch": _drive(effort=60.0, speed=11.7, stiffness=200.0, damping=5.0),
+    "Ankle_Pitch": _drive(effort=20.0, speed=18.8, stiffness=50.0, damping=3.0),
+    "Ankle_Roll": _drive(effort=15.0, speed=12.4, stiffness=50.0, damping=3.0),
 }
 # Elbow_Pitch turns the upper arm about itself, Elbow_Yaw bends the elbow.
 _ARMS = dict.fromkeys(("Shoulder_Pitch", "Shoulder_Roll", "Elbow_Pitch", "Elbow_Yaw"), _ARM)
 
 
-def _limb(side: str, drives: dict[str, _Drive]) -> tuple[Actuator, ...]:
-    return tuple(drive.drive(f"{side}_{joint}") for joint, drive in drives.items())
-
-
+_JOINT = "{Side}_{joint}"
 _ACTUATORS = (
-    _HEAD.drive("AAHead_yaw"),
-    _HEAD.drive("Head_pitch"),
-    *_limb("Left", _ARMS),
-    *_limb("Right", _ARMS),
-    _WAIST.drive("Waist"),
-    *_limb("Left", _LEG),
-    *_limb("Right", _LEG),
+    _HEAD.actuator("AAHead_yaw"),
+    _HEAD.actuator("Head_pitch"),
+    *limb(_JOINT, "left", _ARMS),
+    *limb(_JOINT, "right", _ARMS),
+    _WAIST.actuator("Waist"),
+    *limb(_JOINT, "left", _LEG),
+    *limb(_JOINT, "right", _LEG),
 )
-
-_NAMES = {"left": "Left", "right": "Right"}  # suffix of leg bodies, prefix of joints
-_ARM_PREFIX = {"left": "AL", "right": "AR"}
-
-
-def _both(**joints: float) -> dict[str, float]:
-    """Joint values that are the same on both sides."""
-    return {f"{_NAMES[s]}_{joint}": value for s in SIDES for joint, value in joints.items()}
 
 
 def _keypoints() -> dict[str, BodyPoint]:
     points = {"pelvis": BodyPoint("Trunk")}
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        name = _NAMES[side]
         points |= {
-            f"{side}_hip": BodyPoint(f"Hip_Pitch_{name}"),
-            f"{side}_knee": BodyPoint(f"Shank_{name}"),
-            f"{side}_ankle": BodyPoint(f"Ankle_Cross_{name}"),
+            f"{side}_hip": BodyPoint(sided("Hip_Pitch_{Side}", side)),
+            f"{side}_knee": BodyPoint(sided("Shank_{Side}", side)),
+            f"{side}_ankle": BodyPoint(sided("Ankle_Cross_{Side}", side)),
             f"{side}_toe": BodyPoint(f"{side}_foot_link", (0.12, 0.0, -0.03)),
-            f"{side}_shoulder": BodyPoint(f"{_ARM_PREFIX[side]}1"),
+            f"{side}_shoulder": BodyPoint(sided("A{S}1", side)),
             f"{side}_elbow": BodyPoint(f"{side}_hand_link"),
             f"{side}_hand": BodyPoint(f"{side}_hand_link", (0.0, sign * 0.2, 0.0)),
         }
@@ -101,7 +80,7 @@ T1 = Robot(
     default_root_height=0.66585,
     default_joint_positions={
         # The published ankle of -0.25 tips the soles 3° out of the ground.
-        **_both(Shoulder_Pitch=0.2, Hip_Pitch=-0.2, Knee_Pitch=0.4, Ankle_Pitch=-0.2),
+        **same(_JOINT, Shoulder_Pitch=0.2, Hip_Pitch=-0.2, Knee_Pitch=0.4, Ankle_Pitch=-0.2),
         "Left_Shoulder_Roll": -1.35,
         "Right_Shoulder_Roll": 1.35,
         "Left_Elbow_Yaw": -0.5,
@@ -109,32 +88,15 @@ T1 = Robot(
     },
     keypoints=_keypoints(),
     feet={side: Foot(f"{side}_foot_link", _SOLE) for side in SIDES},
-    contact_links={
-        f"{side}_{link}": bodies
-        for side in SIDES
-        for link, bodies in (
-            ("hand", (f"{side}_hand_link",)),
-            ("foot", (f"{side}_foot_link",)),
-            ("knee", (f"Shank_{_NAMES[side]}",)),
-        )
-    },
+    contact_links=contact_links(
+        hand="{side}_hand_link", foot="{side}_foot_link", knee="Shank_{Side}"
+    ),
     tracked_bodies=(
         "Trunk",
         "Waist",
-        *(
-            body
-            for s in SIDES
-            for body in (f"Hip_Yaw_{_NAMES[s]}", f"Shank_{_NAMES[s]}", f"{s}_foot_link")
-        ),
-        *(
-            body
-            for s in SIDES
-            for body in (f"{_ARM_PREFIX[s]}1", f"{_ARM_PREFIX[s]}3", f"{s}_hand_link")
-        ),
+        *both("Hip_Yaw_{Side}", "Shank_{Side}", "{side}_foot_link"),
+        *both("A{S}1", "A{S}3", "{side}_hand_link"),
     ),
-    end_effectors=(
-        *(f"{s}_foot_link" for s in SIDES),
-        *(f"{s}_hand_link" for s in SIDES),
-    ),
+    end_effectors=(*both("{side}_foot_link"), *both("{side}_hand_link")),
     posture_weights={"Waist": 0.2},
 )
