@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -120,8 +120,11 @@ def run(arguments: Arguments) -> dict[str, Any]:
     with progress_bar("Evaluating", unit="episodes", disable=arguments.json) as progress:
         evaluation = evaluate_run(config.out, progress=progress)
     evaluation.save(config.out)
-    exported = export_run(config.out)
-    return {**asdict(evaluation), **exported, "out": str(config.out)}
+    if evaluation.motions:
+        note = "a policy file holds one motion: none was written for these"
+        print(f"train.py: {note} {len(evaluation.motions)}", file=sys.stderr)
+    exported = {} if evaluation.motions else export_run(config.out)
+    return {**evaluation.figures(), **exported, "out": str(config.out)}
 
 
 def _mapping(flag: str, text: str) -> dict[str, Any]:

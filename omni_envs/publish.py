@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,7 +92,7 @@ def publish(
     exported = export_run(out, described=config)
     steps, fell = _strip(TrainConfig.load(out), Path(exported["path"]), out / STRIP)
     _write_card(out, config, state, evaluation, f"{steps} control steps" + (", a fall" * fell))
-    return {**asdict(evaluation), **exported, "card": str(out / CARD)}
+    return {**evaluation.figures(), **exported, "card": str(out / CARD)}
 
 
 def _motion(config: TrainConfig) -> Reference:

@@ -125,6 +125,17 @@ def test_the_command_in_the_sidecar_repeats_the_run(run):
     assert dataclasses.replace(again, num_threads=config.num_threads) == config
 
 
+def test_several_motions_are_trained_and_evaluated_without_a_file(reference, tmp_path, capsys):
+    options = json.dumps({"reference": [str(reference)] * 2})
+    words = _words(tmp_path / "run", reference, "--json", "--env-options", options)
+    assert train.main(words) == 0
+    shown = capsys.readouterr()
+    figures = json.loads(shown.out)
+    assert [m["episodes"] for m in figures["motions"]] == [3, 2] and "path" not in figures
+    assert "a policy file holds one motion" in shown.err
+    assert not (tmp_path / "run" / "policy.onnx").exists()
+
+
 def test_a_used_run_directory_is_refused(run, reference, capsys):
     assert train.main(_words(run, reference)) == 1
     assert "already holds a training run" in capsys.readouterr().err

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -28,6 +28,27 @@ UNCLIPPED = 1e3
 
 
 @dataclass(frozen=True)
+class MotionEvaluation:
+    """Figures of one of several motions; see ``Evaluation``.
+
+    Attributes:
+        motion: Its place in the order given.
+        episodes: Episodes of it.
+        success_rate: Share of them that hit no termination criterion.
+        success_ci95: Its 95 % confidence interval (Wilson).
+        episode_length_mean: Control steps.
+        episode_length_possible: Control steps of the whole motion.
+    """
+
+    motion: int
+    episodes: int
+    success_rate: float
+    success_ci95: tuple[float, float]
+    episode_length_mean: float
+    episode_length_possible: int
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """Figures of a policy; an episode runs from the motion's first frame to its end.
 
@@ -39,7 +60,7 @@ class Evaluation:
             its reference, stricter than the task; None without an object.
         episodes: Number of episodes.
         episode_length_mean: Control steps.
-        episode_length_possible: Control steps of a whole motion.
+        episode_length_possible: Control steps of a whole motion, of the longest of several.
         return_mean: Undiscounted return per episode.
         body_error_mean_m: Distance of the tracked bodies from the re-aligned reference, m.
         window_survival_rate: Share of noise-free windows, spread evenly over the motion, that hit
@@ -50,6 +71,7 @@ class Evaluation:
         window_seconds: Length of a window, s.
         steps: Control steps that the policy was trained for.
         seconds: Its training time.
+        motions: Each motion by itself where there are several, which take turns in the episodes.
     """
 
     success_rate: float
@@ -67,11 +89,17 @@ class Evaluation:
     window_seconds: float
     steps: int
     seconds: float
+    motions: tuple[MotionEvaluation, ...] = ()
+
+    def figures(self) -> dict[str, Any]:
+        """Returns everything as JSON-compatible data, ``motions`` only where there are several."""
+        data = asdict(self)
+        return data if self.motions else {k: v for k, v in data.items() if k != "motions"}
 
     def save(self, run: str | Path) -> Path:
         """Writes ``evaluation.json`` into a run directory."""
         path = Path(run) / EVALUATION_FILE
-        path.write_text(json.dumps(asdict(self), indent=2, allow_nan=False) + "\n")
+        path.write_text(json.dumps(self.figures(), indent=2, allow_nan=False) + "\n")
         return path
 
 
@@ -116,23 +144,26 @@ def make_evaluation_env(config: TrainConfig, num_envs: int, **kind: bool) -> Vec
 
 
 def play_windows(
-    env: VectorEnv, policy: Policy, frames: int, seconds: float = WINDOW_SECONDS
+    env: VectorEnv, policy: Policy, frames: Sequence[int], seconds: float = WINDOW_SECONDS
 ) -> tuple[Episodes, float]:
-    """Plays one window per simulation, start frames spread evenly over the motion.
+    """Plays one window per simulation, start frames spread evenly over the motions.
 
     Args:
-        env: Environment of one motion, best without randomization.
+        env: Environment of the motions, best without randomization.
         policy: Who acts.
-        frames: Frames of the motion.
+        frames: Frames of each motion.
         seconds: Length of a window; a shorter motion is one window.
 
     Returns:
         The windows as episodes, and their length in s.
     """
     dt = env.unwrapped.control_step  # type: ignore[attr-defined]
-    steps = min(round(seconds / dt), frames - 1)
-    start = np.linspace(0, frames - 1 - steps, env.num_envs).round().astype(int)
-    options = {"motion": np.zeros(env.num_envs, int), "frame": start}
+    steps = min(round(seconds / dt), min(frames) - 1)
+    motion, start = _turns(env.num_envs, len(frames)), np.zeros(env.num_envs, int)
+    for m, length in enumerate(frames):
+        mine = motion == m
+        start[mine] = np.linspace(0, length - 1 - steps, mine.sum()).round().astype(int)
+    options = {"motion": motion, "frame": start}
     return play(env, policy, seed=0, options=options, max_steps=steps), steps * dt
 
 
@@ -159,25 +190,25 @@ def evaluate(
     """
     env = make_evaluation_env(config, config.evaluation_episodes, file=file)
     try:
-        whole = play(env, policy, seed=seed, progress=progress)
-        references = env.unwrapped.references  # type: ignore[attr-defined]
+        frames = [r.num_frames for r in env.unwrapped.references]  # type: ignore[attr-defined]
+        turns = _turns(env.num_envs, len(frames))
+        whole = play(env, policy, seed=seed, options={"motion": turns}, progress=progress)
     finally:
         env.close()
-    frames = references[0].num_frames
     env = make_evaluation_env(config, WINDOWS, randomized=False, file=file)
     try:
         windows, window_seconds = play_windows(env, policy, frames)
         dt = env.unwrapped.control_step  # type: ignore[attr-defined]
     finally:
         env.close()
-    successes = int((~whole.terminated).sum())
+    rate, interval = _success(whole, np.ones(len(turns), bool))
     return Evaluation(
-        success_rate=successes / len(whole.lengths),
-        success_ci95=wilson_interval(successes, len(whole.lengths)),
+        success_rate=rate,
+        success_ci95=interval,
         carried_rate=_carried(whole),
         episodes=len(whole.lengths),
         episode_length_mean=float(whole.lengths.mean()),
-        episode_length_possible=max(r.num_frames for r in references) - 1,
+        episode_length_possible=max(frames) - 1,
         return_mean=float(whole.returns.mean()),
         body_error_mean_m=_weighted(whole),
         window_survival_rate=float((~windows.terminated).mean()),
@@ -187,6 +218,34 @@ def evaluate(
         window_seconds=window_seconds,
         steps=steps,
         seconds=seconds,
+        motions=_by_motion(whole, turns, frames) if len(frames) > 1 else (),
+    )
+
+
+def _turns(episodes: int, motions: int) -> np.ndarray:
+    """Returns the (episodes,) motions that take turns."""
+    return np.arange(episodes) % motions
+
+
+def _success(episodes: Episodes, mine: np.ndarray) -> tuple[float, tuple[float, float]]:
+    """Returns the success rate of some episodes (N,) and its interval."""
+    count, successes = int(mine.sum()), int((~episodes.terminated & mine).sum())
+    return successes / count, wilson_interval(successes, count)
+
+
+def _by_motion(
+    episodes: Episodes, turns: np.ndarray, frames: Sequence[int]
+) -> tuple[MotionEvaluation, ...]:
+    return tuple(
+        MotionEvaluation(
+            m,
+            int((turns == m).sum()),
+            *_success(episodes, turns == m),
+            float(episodes.lengths[turns == m].mean()),
+            length - 1,
+        )
+        for m, length in enumerate(frames)
+        if (turns == m).any()
     )
 
 

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,7 +7,8 @@ from omni_envs.envs import OmniVectorEnv
 from omni_envs.references import Reference, reference_from_qpos
 from omni_envs.robots import G1
 from omni_envs.tracking import make_config
-from omni_envs.training.evaluate import evaluation_options, play_windows
+from omni_envs.training.config import TrainConfig
+from omni_envs.training.evaluate import evaluate, evaluation_options, play_windows
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +82,7 @@ def test_windows_are_spread_evenly_over_the_motion(standing):
         seen.append(frames.copy())
         return np.zeros((4, 29))
 
-    windows, seconds = play_windows(env, policy, 40, seconds=0.2)
+    windows, seconds = play_windows(env, policy, [40], seconds=0.2)
     assert seconds == pytest.approx(0.2) and (windows.lengths == 10).all()
     # an episode that starts in frame k tracks frame k + 1 first
     np.testing.assert_array_equal(seen[0], np.array([0, 10, 19, 29]) + 1)
@@ -90,6 +93,45 @@ def test_a_short_motion_is_one_window(standing):
     env = OmniVectorEnv(
         2, num_threads=1, **evaluation_options({"reference": standing}, randomized=False)
     )
-    windows, seconds = play_windows(env, lambda o, f: np.zeros((2, 29)), 40, seconds=3.0)
+    windows, seconds = play_windows(env, lambda o, f: np.zeros((2, 29)), [40], seconds=3.0)
     assert seconds == pytest.approx(39 * 0.02)
     assert (windows.lengths <= 39).all()
+
+
+def test_every_motion_is_evaluated_by_itself(sway, tmp_path):
+    short = str(sway(30).save(tmp_path / "short.npz"))
+    falls = sway(60)  # moved up beyond the height that ends an episode: nobody can follow
+    falls.qpos[30:, 2] += 0.5
+    long = str(
+        reference_from_qpos(G1, 50.0, falls.qpos, falls.object_poses, falls.scene).save(
+            tmp_path / "long.npz"
+        )
+    )
+    config = TrainConfig(
+        "OmniEnvs/G1BoxCarry-v0",
+        tmp_path,
+        1,
+        num_threads=1,
+        evaluation_episodes=7,
+        env_options={"reference": [short, long], "action": {"mode": "feedforward"}},
+    )
+    starts = []
+
+    def still(observations, frames):
+        starts.append(frames)
+        return np.zeros((len(frames), 29))
+
+    found = evaluate(config, still)
+    one, two = found.motions
+    assert (one.motion, one.episodes, one.episode_length_possible) == (0, 4, 29)
+    assert (two.motion, two.episodes, two.episode_length_possible) == (1, 3, 59)
+    assert two.success_rate == 0.0 and two.episode_length_mean < 35
+    assert found.success_rate == pytest.approx(4 * one.success_rate / 7)
+    assert found.episode_length_mean == pytest.approx(
+        (4 * one.episode_length_mean + 3 * two.episode_length_mean) / 7
+    )
+    windows = next(frames for frames in starts if len(frames) == 64)
+    np.testing.assert_array_equal(windows[::2], 1)  # 29 control steps: one window
+    assert windows[1::2].min() == 1 and windows[1::2].max() == 31
+    assert "motions" in found.figures()
+    assert "motions" not in replace(found, motions=()).figures()
