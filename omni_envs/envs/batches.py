@@ -45,20 +45,30 @@ def empty_observations(num: int, policy: int, critic: int | None) -> Observation
     return {key: np.empty((num, size), np.float32) for key, size in sizes.items()}
 
 
-def masked_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Returns the keys of infos: the names, then for each the mask ``_name`` of who has it."""
-    return (*names, *(f"_{name}" for name in names))
-
-
-def batched_infos(keys: tuple[str, ...], rows: list[np.ndarray], who: np.ndarray) -> dict[str, Any]:
-    """Returns infos.
+class Infos:
+    """Makes infos of N simulations: each key with a mask ``_key`` of who has it.
 
     Args:
-        keys: From ``masked_names``.
-        rows: (N,) values of each name.
-        who: (N,) which simulations have them.
+        names: The keys.
+        num: N.
     """
-    return dict(zip(keys, rows + [who] * len(rows), strict=True))
+
+    def __init__(self, names: Iterable[str], num: int) -> None:
+        self.names = tuple(names)
+        self._masks = tuple(f"_{name}" for name in self.names)
+        everyone = np.ones(num, bool)
+        everyone.flags.writeable = False  # it is handed out every time
+        self._template: dict[str, Any] = dict.fromkeys((*self.names, *self._masks), everyone)
+
+    def of(self, rows: Iterable[np.ndarray]) -> dict[str, Any]:
+        """Returns infos that every simulation has, from (N,) values for each name."""
+        infos = self._template.copy()
+        infos.update(zip(self.names, rows, strict=True))
+        return infos
+
+    def masked(self, infos: dict[str, Any], who: np.ndarray) -> dict[str, Any]:
+        """Returns the same infos as those of some simulations, (N,)."""
+        return infos | dict.fromkeys(self._masks, who)
 
 
 def add_finals(

@@ -40,7 +40,8 @@ class ObjectGate:
         """Counts finished episodes: (K,) control steps they lasted and could have lasted."""
         if self.open:
             return
-        self._recent.extend((lasted / possible).tolist())
+        shares = zip(lasted.tolist(), possible.tolist(), strict=True)
+        self._recent.extend([a / b for a, b in shares])
         full = len(self._recent) == GATE_EPISODES
         self.open = full and sum(self._recent) >= self._share * GATE_EPISODES
 

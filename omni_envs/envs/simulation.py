@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
@@ -72,18 +74,7 @@ class Simulation:
         self.variant = np.zeros(num, int)
         self._diverged, self._spoilt, self.exploded = np.zeros(num, bool), False, False
         self._before = (np.empty_like(self.qpos), np.empty_like(self.qvel), self.qvel.copy())
-        # Nearly all of them are reals: a loop that copies these is as fast as memory.
-        self._live = tuple(_flat(a) for a in self._fields.values() if a.dtype == float)
-        self._live = self._live or (np.empty((num, 0)),)
-        values = {k: np.ascontiguousarray(variants.fields[k]) for k in self._fields}
-        pools = [_flat(v) for v in values.values() if v.dtype == float]
-        self._pool = np.concatenate(pools, axis=1) if pools else np.empty((1, 0))
-        self._others = []
-        for name, live in self._fields.items():
-            if live.dtype != float:
-                live[:] = values[name][0]
-                if (values[name] != values[name][0]).any():
-                    self._others.append((values[name], live))
+        self._live, self._pool = _varying(self._fields, variants.fields)
         self._use_variants(np.arange(num), self.variant)
 
     def step(self) -> np.ndarray:
@@ -168,10 +159,35 @@ class Simulation:
 
     def _use_variants(self, ids: np.ndarray, variant: np.ndarray) -> None:
         kernels.exchange_models(self._pool, variant, ids, self._live, self.variant, self._warmstart)
-        for values, live in self._others:
-            live[ids] = values[variant]
         if self._variants.models:
             self.batch.set_models([self._variants.models[v] for v in self.variant])
+
+
+def _varying(
+    live: Mapping[str, np.ndarray], values: Mapping[str, np.ndarray]
+) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Finds what an episode's model brings: of all fields the entries in which the models differ.
+
+    Args:
+        live: Field to (N, …) values of the simulations; entries in which the models agree are
+            written here, once.
+        values: Field to (M, …) values of the models.
+
+    Returns:
+        (N, …) views of the entries that differ, and their (M, S) values in all models.
+    """
+    count = max((len(v) for v in values.values()), default=1)
+    parts, pools = [], [np.empty((count, 0))]
+    for name, array in live.items():
+        rows, known = _flat(array), values[name].reshape(len(values[name]), -1)
+        rows[:] = known[0]
+        differing = (known != known[0]).any(axis=0).nonzero()[0]
+        if len(differing):
+            between = slice(int(differing[0]), int(differing[-1]) + 1)
+            parts.append(rows[:, between])
+            pools.append(known[:, between].astype(float))  # exact for small integers, too
+    # One part at least: a compiled loop takes no empty tuple.
+    return tuple(parts) or (np.empty((1, 0)),), np.concatenate(pools, axis=1)
 
 
 def _flat(values: np.ndarray) -> np.ndarray:

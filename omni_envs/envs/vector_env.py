@@ -12,12 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from omni_envs.envs.batches import (
+    Infos,
     Observation,
     add_finals,
-    batched_infos,
     copied,
     empty_observations,
-    masked_names,
     observation_space,
 )
 from omni_envs.envs.compiled import CompiledTask, Judged
@@ -197,15 +196,18 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._task.noise_share = self._noise.observed
         self.sampler = MotionSampler(self._library, config.reset)
         self.divergences = DivergenceLog()
-        self._scale = self.robot.action_scale * config.action.scale
+        self._scale, self._limit = (
+            self.robot.action_scale * config.action.scale,
+            config.action.limit,
+        )
         # What residual actions count from, as actions.
         targets = self._library.targets
         self._lead = np.empty((0, self.robot.num_joints))
         if targets is not None:
             self._lead = (targets - self.robot.default_joint_array) / self._scale
         self._started = False
-        self._info_names = (*self._task.figures, *self._task.flags, *PLACE)
-        self._info_keys, self._place_keys = map(masked_names, (self._info_names, PLACE))
+        names = (*self._task.figures, *self._task.flags, *PLACE)
+        self._infos, self._start_infos = Infos(names, num_envs), Infos(PLACE, num_envs)
         self.policy_layout, self.critic_layout = plain.policy_layout, plain.critic_layout
         critic = self.critic_layout.size if config.observation.privileged else None
         self.single_observation_space = observation_space(self.policy_layout.size, critic)
@@ -262,8 +264,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             Observations of all simulations, and infos.
         """
         self.restart(seed, options)
-        everyone = np.ones(self.num_envs, bool)
-        return copied(self.observations), batched_infos(self._place_keys, self._place(), everyone)
+        return copied(self.observations), self._start_infos.of(self._place())
 
     def restart(
         self, seed: int | list[int | None] | None = None, options: Options | None = None
@@ -315,12 +316,11 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             )
         judged = self.advance(actions)
         flags = judged.flags
-        rows = [*judged.figures, *(flags[k] for k in self._task.flag_rows), *self._place()]
-        infos = batched_infos(self._info_keys, rows, np.ones(self.num_envs, bool))
+        rows = [*judged.figures, *[flags[k] for k in self._task.flag_rows], *self._place()]
+        infos = self._infos.of(rows)
         if judged.some_done and self.autoreset_mode is AutoresetMode.SAME_STEP:
             done = judged.done.copy()
-            final_info = batched_infos(self._info_keys, rows, done)
-            add_finals(infos, final_info, self.observations, done)
+            add_finals(infos, self._infos.masked(infos, done), self.observations, done)
             self._start(done.nonzero()[0])
             infos.update(zip(PLACE, self._place(), strict=True))
         observations = copied(self.observations)
@@ -380,7 +380,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         action, bad = np.empty_like(actions), np.empty(self.num_envs, bool)
         some_bad = kernels.joint_targets(
             actions,
-            self.config.action.limit,
+            self._limit,
             self._lead,
             episodes.rows,
             episodes.default,
@@ -454,7 +454,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         flags = judged.flags[:, 0].tolist()
         values = judged.figures[:, 0].tolist()
         values += [flags[k] for k in self._task.flag_rows]
-        return dict(zip(self._info_names, values + place, strict=True))
+        return dict(zip(self._infos.names, values + place, strict=True))
 
     def _record_divergence(self, ids: np.ndarray) -> None:
         for i in ids:

@@ -17,7 +17,7 @@ from math import acos, atan2, cos, exp, floor, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import literal_unroll, njit
 
 from omni_envs.tracking.alignment import Bodies
 from omni_envs.tracking.motion import Columns
@@ -869,7 +869,7 @@ def exchange_models(
     """
     for k in range(len(ids)):
         start, i, model = 0, ids[k], models[k]
-        for part in out:
+        for part in literal_unroll(out):
             for c in range(part.shape[1]):
                 part[i, c] = source[model, start + c]
             start += part.shape[1]
