@@ -116,6 +116,16 @@ def test_bad_input_is_one_line_and_status_1(tmp_path, reference, capsys, more, m
     assert message in error and error.startswith("train.py: ") and "\n" not in error
 
 
+def test_the_device_is_the_runs_unless_another_is_asked_for(run, tmp_path):
+    def config(*words: str) -> TrainConfig:
+        steps = ["--steps", "64", "--out", str(run)]
+        return train.make_config(tyro.cli(train.Arguments, args=[*steps, *words]))
+
+    assert config().device == "cpu" and config("--device", "cuda").device == "cuda"
+    assert config("--resume").device == TrainConfig.load(run).device == "cpu"
+    assert config("--resume", "--device", "auto").device == "auto"
+
+
 def test_the_command_in_the_sidecar_repeats_the_run(run):
     command = json.loads((run / "policy.json").read_text())["command"]
     words = shlex.split(command)

@@ -103,6 +103,16 @@ def test_resuming_a_finished_run_changes_nothing(config, env, tmp_path):
     assert again.steps == 4 * ROLLOUT and _same(first, _policy(tmp_path))
 
 
+def test_the_checkpoint_tells_what_trained(config, env, tmp_path, monkeypatch):
+    train(config(tmp_path, num_threads=1), env=env())
+    assert Checkpoint.load(checkpoints(tmp_path)[-1]).machines == ["1 CPU core"]
+    for k, name in enumerate(("16 CPU cores, a GPU", "1 CPU core"), start=5):
+        monkeypatch.setattr("omni_envs.training.run.machine", lambda *_, name=name: name)
+        train(config(tmp_path, k * ROLLOUT), resume=True, env=env())
+    told = Checkpoint.load(checkpoints(tmp_path)[-1]).machines
+    assert told == ["16 CPU cores, a GPU", "1 CPU core"]
+
+
 def test_resuming_twice_gives_the_same_weights(config, env, tmp_path):
     policies = []
     for name in ("one", "two"):
