@@ -275,12 +275,15 @@ class ResetConfig:
 
     Attributes:
         start: ``"uniform"`` over all frames, ``"start"`` of a motion, or ``"adaptive"``.
+        start_share: Share of the episodes that start at the first frame of a motion whatever
+            ``start`` says: a policy is judged by those (0.2 in one release of holosoma).
         noise: Noise on the start state, or None.
         growth: How the noise grows in training, or None: all of it from the first episode on.
         adaptive: How adaptive sampling weighs failures.
     """
 
     start: Literal["uniform", "start", "adaptive"] = "uniform"
+    start_share: float = 0.0
     noise: ResetNoise | None = ResetNoise()
     growth: NoiseGrowth | None = None
     adaptive: AdaptiveSampling = AdaptiveSampling()

@@ -43,6 +43,7 @@ RULES: tuple[tuple[str, Rule], ...] = (
     ("randomization.object.inertia", _INTERVAL),
     ("randomization.object.shape", ("from 0 to below 1", lambda v: 0 <= v < 1)),
     ("randomization.*", _WIDTH),
+    ("reset.start_share", _SHARE),
     ("reset.growth.share", _SHARE),
     ("reset.growth.step", _SHARE),
     ("reset.adaptive.uniform", _POSITIVE),

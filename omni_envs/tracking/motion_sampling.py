@@ -40,11 +40,15 @@ class MotionSampler:
         self._bins_per_frame = counts / (library.lengths - 1)
         self._counts = counts
         # Stretches of motion to draw from: motion, first frame, frames.
-        self._cells = (self.bin_motion, low, width)
+        self._cells: tuple[np.ndarray, ...] = (self.bin_motion, low, width)
+        motions = np.arange(library.num_motions)
+        nothing = np.zeros(len(motions))
         if not self.adapts:
-            motions = np.arange(library.num_motions)
             frames = 0 if config.start == "start" else library.lengths - 1
-            self._cells = (motions, np.zeros(len(motions)), np.zeros(len(motions)) + frames)
+            self._cells = (motions, nothing, nothing + frames)
+        if config.start_share:
+            first = (motions, nothing, nothing)
+            self._cells = tuple(map(np.concatenate, zip(self._cells, first, strict=True)))
         self.reset()
 
     def reset(self) -> None:
@@ -112,7 +116,11 @@ class MotionSampler:
             (K,) motions and (K,) frames within them, at most the last but one.
         """
         if self._cumulative is None:
-            self._cumulative = np.cumsum(self._shares())
+            shares, first = self._shares(), self.config.start_share
+            if first:
+                motions = len(self._last_start)
+                shares = np.append((1.0 - first) * shares, np.full(motions, first / motions))
+            self._cumulative = np.cumsum(shares)
         motion, frame = np.empty((2, len(draws)), int)
         kernels.draw_frames(self._cumulative, *self._cells, self._last_start, draws, motion, frame)
         return motion, frame

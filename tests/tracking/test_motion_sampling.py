@@ -33,6 +33,18 @@ def test_start_draws_the_first_frames(sway, rng):
     assert 400 < motion.sum() < 600
 
 
+@pytest.mark.parametrize("start", ["uniform", "adaptive", "start"])
+def test_a_share_starts_at_the_first_frames_of_all_motions(sway, rng, start):
+    library = MotionLibrary(G1, [sway(120), sway(60)], 50.0)
+    sampler = MotionSampler(library, ResetConfig(start=start, start_share=0.3))
+    motion, frame = sampler.draw(rng.random((20_000, 2)))
+    first = frame == 0
+    # Some more where uniform draws over 178 frames, or over two first bins of fifths, hit them.
+    assert np.isclose(first.mean(), 1.0 if start == "start" else 0.3, atol=0.025)
+    assert abs(motion[first].mean() - 0.5) < 0.03
+    assert len(np.unique(frame)) == (1 if start == "start" else 119)
+
+
 def test_bins_are_about_a_second(sway):
     sampler = make(sway, "adaptive", frames=(120, 60, 325))
     assert np.bincount(sampler.bin_motion).tolist() == [3, 2, 7]  # ⌊T / 50⌋ + 1
