@@ -10,13 +10,15 @@ import numpy as np
 from omni_envs.demonstrations.contact import object_contacts, terrain_contacts
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.footing import knee_floor
-from omni_envs.demonstrations.stance import STANCE_MODES, stance_schedule
+from omni_envs.demonstrations.stance import STANCE_MODES, pivot_schedule, stance_schedule
 from omni_envs.errors import InvalidOptionError
-from omni_envs.robots import KEYPOINTS
+from omni_envs.robots import KEYPOINTS, SIDES
 from omni_envs.scenes import Scene
 
 MAT_HEIGHT = 0.1
 """Toes that never come lower than this stand on a mat of this height, m (human scale)."""
+
+_FOOT = ("toe", "ankle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +66,21 @@ class SourceMotion:
     def num_frames(self) -> int:
         """T."""
         return len(self.keypoints)
+
+    def pivots(self, stance: np.ndarray) -> np.ndarray:
+        """When the human's standing feet roll or turn on their toes: see ``pivot_schedule``.
+
+        Args:
+            stance: (T, 2) bool, left and right foot.
+
+        Returns:
+            (T, 2) bool.
+        """
+        columns = []
+        for side, name in enumerate(SIDES):
+            toe, ankle = (self.keypoints[:, KEYPOINTS.index(f"{name}_{p}")] for p in _FOOT)
+            columns.append(pivot_schedule(ankle - toe, stance[:, side], self.fps))
+        return np.column_stack(columns)
 
 
 def scale_demonstration(demonstration: Demonstration, robot_height: float) -> SourceMotion:

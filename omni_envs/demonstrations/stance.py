@@ -23,6 +23,10 @@ STANCE_MODES: tuple[StanceMode, ...] = get_args(StanceMode)
 _TEXT_SPEED, _CODE_SPEED = 0.01, 0.30
 _BEGIN_SPEED, _END_SPEED, _MIN_FRAMES = 0.10, 0.15, 3
 
+# A standing foot that turns further than this (rad) pivots; one that turns less in the rest (s)
+# after has come to rest.
+_PIVOT, _KEPT, _REST = np.deg2rad(15.0), np.deg2rad(5.0), 0.5
+
 
 def toe_speeds(toe_positions: np.ndarray, fps: float) -> np.ndarray:
     """Horizontal speed (T,) of a toe path (T, 3), m/s; infinite on frame 0, which has no step."""
@@ -63,6 +67,44 @@ def stance_schedule(
         standing = bool(v <= (_END_SPEED if standing else _BEGIN_SPEED))
         stance[t] = standing
     return _drop_short(stance, _MIN_FRAMES)
+
+
+def pivot_schedule(directions: np.ndarray, stance: np.ndarray, fps: float) -> np.ndarray:
+    """Returns when a standing foot rolls or turns on its toes.
+
+    The toe decides when a foot stands, so one stance may hold a flat foot, its roll onto the toes
+    and a time on tiptoe. Here it falls into parts: the foot keeps its direction, within 15° of that
+    at the start of the part; or it pivots on its toes, from where it leaves that direction until it
+    has found another that it keeps for half a second.
+
+    Args:
+        directions: (T, 3) vectors from toe to ankle of the human.
+        stance: (T,) bool.
+        fps: Frames per second.
+
+    Returns:
+        (T,) bool: it stands, and pivots.
+    """
+    units = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
+    pivots = np.zeros(len(stance), bool)
+    ahead = max(1, round(_REST * fps))
+    for start, stop in stance_intervals(stance):
+        part = units[start:stop]
+        begin = 0
+        while begin < len(part):
+            away = np.arccos(np.clip(part[begin:] @ part[begin], -1.0, 1.0))
+            gone = np.flatnonzero(away > _PIVOT)
+            if not len(gone):
+                break
+            left = begin + int(np.flatnonzero(away[: gone[0]] <= _KEPT)[-1]) + 1
+            end = len(part)
+            for t in range(begin + int(gone[0]) + 1, len(part) - ahead + 1):
+                if (part[t : t + ahead] @ part[t]).min() >= np.cos(_KEPT):
+                    end = t
+                    break
+            pivots[start + left : start + end] = True
+            begin = end
+    return pivots
 
 
 def stance_intervals(stance: np.ndarray) -> list[tuple[int, int]]:

@@ -91,7 +91,10 @@ def _follow(
     if (source.object_poses is None) != (object_poses is None):
         raise InvalidDataError(owner, "object_poses", "given as for the motion", "only one of two")
     soles, normals = playback.soles(), support_normals(playback)
-    drift = {mode: stance_drift(soles, normals, flags) for mode, flags in source.stance.items()}
+    drift = {
+        mode: stance_drift(soles, normals, flags, source.pivots(flags))
+        for mode, flags in source.stance.items()
+    }
     links = tuple(source.contacts)
     keypoints = playback.keypoints()
     error = np.linalg.norm(keypoints - source.keypoints, axis=-1).mean(axis=1)
@@ -100,8 +103,9 @@ def _follow(
     return replace(
         report,
         stance={mode: counted_stance(flags) for mode, flags in source.stance.items()},
-        drift={mode: centre for mode, (centre, _) in drift.items()},
-        pivot_drift={mode: pivot for mode, (_, pivot) in drift.items()},
+        drift={mode: centre for mode, (centre, _, _) in drift.items()},
+        still_drift={mode: still for mode, (_, still, _) in drift.items()},
+        pivot_drift={mode: pivot for mode, (_, _, pivot) in drift.items()},
         contact={link: np.asarray(source.contacts[link], bool) for link in links},
         contact_distance={k: link_distance(playback, k, contact_surfaces(scene, k)) for k in links},
         contact_depth={k: np.maximum(0.0, -link_distance(playback, k, TARGETS)) for k in links},

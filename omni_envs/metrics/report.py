@@ -43,6 +43,8 @@ class ReferenceReport:
         stance: Mode to (T, 2) bool: foot and frame count as planted.
         drift: Mode to (T, 2) distance of the sole centre, tangent to its support, from its place at
             the start of the stance interval, m, NaN off stance.
+        still_drift: Mode to (T, 2) the same since the human's foot last rolled or turned on its
+            toes within the stance, NaN while it does: see ``stance_drift``.
         pivot_drift: Mode to (T, 2) the same of the sole point that moved least: what is left when
             rolling over heel or toe is not called drift.
         contact: Link to (T,) bool: the source touches object or terrain.
@@ -66,6 +68,7 @@ class ReferenceReport:
     slip: np.ndarray
     stance: Mapping[str, np.ndarray] = field(default_factory=dict)
     drift: Mapping[str, np.ndarray] = field(default_factory=dict)
+    still_drift: Mapping[str, np.ndarray] = field(default_factory=dict)
     pivot_drift: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_distance: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -59,28 +59,51 @@ def slip_speed(soles: np.ndarray, normals: np.ndarray, fps: float) -> np.ndarray
 
 
 def stance_drift(
-    soles: np.ndarray, normals: np.ndarray, stance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+    soles: np.ndarray, normals: np.ndarray, stance: np.ndarray, pivots: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """How far a planted foot has moved since its stance began, tangent to the support.
+
+    A stance is where the toe stays. Within it the human may roll from the flat foot onto the toes,
+    as at the end of every long step and all the time in a bear crawl; the centre of a sole that
+    rolls along leaves its place by up to its length, though nothing slides. Therefore three
+    figures: the strict one, which counts that; one of the parts in which the human's foot keeps its
+    direction, where the whole sole shall stay; and one of the pivot, which shall stay throughout.
+    The parts are those of the source (``SourceMotion.pivots``), so a robot that rolls where the
+    human does not is not excused.
 
     Args:
         soles: (T, 2, K, 3) sole points, the toe tip last, m.
         normals: (T, 2, 3) support normals.
         stance: (T, 2) bool.
+        pivots: (T, 2) bool, the human's foot rolls or turns on its toes.
 
     Returns:
-        (T, 2) of the sole centre, the mean of all points but the toe tip; and (T, 2) of the point
-        that moved least, which does not count rolling. Both m, NaN off stance.
+        (T, 2) of the sole centre, the mean of all points but the toe tip; (T, 2) of the same while
+        the human's foot does not pivot, from where it was when the stance began or from where the
+        last pivoting left it, whichever is nearer; and (T, 2) of the point that moved least since
+        the stance began. All m, NaN off stance.
     """
-    centre, pivot = np.full(stance.shape, np.nan), np.full(stance.shape, np.nan)
+    centre, still, pivot = np.full((3, *stance.shape), np.nan)
     for side in range(stance.shape[1]):
         for start, end in intervals(stance[:, side]):
-            feet = soles[start:end, side]
-            moved = _tangent(feet - feet[0], normals[start:end, side, None])
-            corners = moved[:, :-1] if moved.shape[1] > 1 else moved
-            centre[start:end, side] = np.linalg.norm(corners.mean(axis=1), axis=-1)
+            moved = _moved(soles[start:end, side], normals[start:end, side])
+            centre[start:end, side] = _of_centre(moved)
             pivot[start:end, side] = np.linalg.norm(moved, axis=-1).min(axis=1)
-    return centre, pivot
+        for start, end in intervals(stance[:, side] & ~pivots[:, side]):
+            moved = _moved(soles[start:end, side], normals[start:end, side])
+            still[start:end, side] = np.minimum(_of_centre(moved), centre[start:end, side])
+    return centre, still, pivot
+
+
+def _moved(sole: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(F, K, 3) displacement of (F, K, 3) points since the first frame, tangent to the support."""
+    return _tangent(sole - sole[0], normals[:, None])
+
+
+def _of_centre(moved: np.ndarray) -> np.ndarray:
+    """(F,) displacement of the sole centre."""
+    corners = moved[:, :-1] if moved.shape[1] > 1 else moved
+    return np.linalg.norm(corners.mean(axis=1), axis=-1)
 
 
 def intervals(flags: np.ndarray) -> Iterator[tuple[int, int]]:

@@ -29,7 +29,8 @@ def summarize(report: ReferenceReport) -> Figures:
     itself. - ``slip_fraction_*``: share of planted foot-frames of that stance set whose slip is
     above 1 cm/s;
       ``slip_max_code_m_s``: fastest slip in the widest set.
-    - ``stance_drift_max_m``: of the sole centre, in the ``default`` set;
+    - ``stance_drift_max_m``: of the sole centre, in the ``default`` set, rolling counted;
+      ``stance_still_drift_max_m``: the same where the human's foot neither rolls nor turns;
       ``stance_pivot_drift_max_m``: of the sole point that moved least, so without rolling.
     - ``contact_fraction_2cm``: share of (link, frame) that the human touches with and the robot is
       within 2 cm; ``contact_clean_fraction``: and the link is at most 1 cm deep.
@@ -47,6 +48,7 @@ def summarize(report: ReferenceReport) -> Figures:
         "slip_fraction_default": _slip_fraction(report, "default", SLIPPING),
         "slip_max_code_m_s": _max(report.planted_slip("code")),
         "stance_drift_max_m": _max(report.drift.get("default")),
+        "stance_still_drift_max_m": _max(report.still_drift.get("default")),
         "stance_pivot_drift_max_m": _max(report.pivot_drift.get("default")),
         "self_penetration_max_m": float(report.penetration[SELF].max()),
         "joint_violation_max_rad": float(report.joint_violation.max()),
@@ -84,6 +86,7 @@ def details(report: ReferenceReport) -> Figures:
         figures[f"slip_mean_{mode}_m_s"] = _mean([slip])
         figures[f"slip_max_{mode}_m_s"] = _max(slip)
         figures[f"stance_drift_max_{mode}_m"] = _max(report.drift[mode])
+        figures[f"stance_still_drift_max_{mode}_m"] = _max(report.still_drift.get(mode))
         figures[f"stance_pivot_drift_max_{mode}_m"] = _max(report.pivot_drift[mode])
     for centimetres in (1, 2, 5):
         near = 0.01 * centimetres

@@ -12,6 +12,7 @@ from omni_envs.retargeting.clip_kinematics import ClipKinematics, trace_clip
 from omni_envs.retargeting.clip_qp import Band, ClipQP
 from omni_envs.retargeting.contact_limit import ContactLimit
 from omni_envs.retargeting.contact_task import ContactTask
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.kept_stance import (
     TIP,
@@ -25,7 +26,7 @@ from omni_envs.retargeting.nominal_task import nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.qp import step_rows
-from omni_envs.retargeting.stance_plan import stance_tiers
+from omni_envs.retargeting.stance_plan import ANCHORED, stance_tiers
 from omni_envs.retargeting.tasks import Quadratic
 from omni_envs.robots import KEYPOINTS, Robot
 
@@ -36,6 +37,7 @@ _RIDGE = 1e-6
 # Part of a speed limit that is left to the restoration of the true constraints.
 _RESERVE = 0.005
 _K = len(KEYPOINTS)
+_FEET = 10  # rows of a frame that hold feet
 
 
 def difference(start: np.ndarray, end: np.ndarray) -> np.ndarray:
@@ -120,7 +122,8 @@ class ClipProgram:
         )
         feet = self._trace(qpos, 0, len(qpos)).positions[:, _K:].reshape(-1, 2, 2, 3)
         tiers = stance_tiers(source, options.stance)
-        self.windows = stance_windows(feet, tiers, source.fps, options.stance)
+        human = HumanFeet.of(source, tiers == ANCHORED)
+        self.windows = stance_windows(feet, tiers, human, source.fps, options.stance)
         self.stance = KeptStance(self.windows, self.configuration)
 
     def place(self, t: int) -> None:
@@ -174,7 +177,7 @@ class ClipProgram:
         frames, n = g.shape
         feet = trace.positions[:, _K:].reshape(frames, 2, 2, 3)
         jacobians = trace.jacobians[:, :, _K:].transpose(0, 2, 1, 3).reshape(frames, 2, 2, 3, n)
-        A, rows = self._rows(contacts, feet[..., :2], jacobians[..., :2, :], start)
+        A, rows = self._rows(contacts, feet, jacobians, start)
         B, C, pairs = self._tip_steps(feet[:, :, TIP], jacobians[:, :, TIP], start)
         box = self._box(qpos[start:stop, 7:], radius)
         change = self._change(qpos[start:stop, 7:], radius)
@@ -258,10 +261,10 @@ class ClipProgram:
     def _rows(
         self, contacts: list[Rows], feet: np.ndarray, jacobians: np.ndarray, start: int
     ) -> tuple[np.ndarray, Band]:
-        """Rows of all frames as arrays of equal length: eight windows of feet, then contacts."""
+        """Rows of all frames as arrays of equal length: ten windows of feet, then contacts."""
         frames, n = len(feet), jacobians.shape[-1]
         counts = np.array([len(r.lower) for r in contacts])
-        shape = (frames, 8 + int(counts.max(initial=0)))
+        shape = (frames, _FEET + int(counts.max(initial=0)))
         A, stiffness = np.zeros((*shape, n)), np.full(shape, _STIFFNESS[STANCE])
         lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
         part = slice(start, start + frames)
@@ -270,8 +273,10 @@ class ClipProgram:
         A[:, :8] = (axes @ jacobians).reshape(frames, 8, n)
         lower[:, :8] = (-slack - offset).reshape(frames, 8)
         upper[:, :8] = (slack - offset).reshape(frames, 8)
+        A[:, 8:_FEET] = jacobians[:, :, TIP, 2]
+        upper[:, 8:_FEET] = self.windows.ceiling[part] - feet[:, :, TIP, 2]
         used = np.zeros(shape, bool)
-        used[:, 8:] = np.arange(shape[1] - 8) < counts[:, None]
+        used[:, _FEET:] = np.arange(shape[1] - _FEET) < counts[:, None]
         A[used] = np.concatenate([r.A for r in contacts])
         lower[used] = np.concatenate([r.lower for r in contacts])
         upper[used] = np.concatenate([r.upper for r in contacts])

@@ -28,14 +28,14 @@ class FootholdTask(CostTask):
         self._weights = plan.arm_weights[t][foot, arm]
         self._targets = plan.arms[t][foot, arm]
         # Components of ``Kinematics.feet`` that are wished for, as a matrix on all of them.
-        select = np.zeros((len(foot), 2, 3, 2))
-        select[np.arange(len(foot)), foot, arm + 1] = plan.forward[t][foot]
-        self._select = select.reshape(-1, 12)
+        select = np.zeros((len(foot), 2, 3, 3))
+        select[np.arange(len(foot)), foot, arm + 1, :2] = plan.forward[t][foot]
+        self._select = select.reshape(-1, 18)
 
     def quadratic(self, configuration: Kinematics) -> Quadratic | None:
         """Returns the Gauss-Newton model of the cost."""
         if not len(self._weights):
             return None
-        arms = self._select @ configuration.feet()[:, :, :2].ravel()
-        J = self._select @ configuration.feet_jacobians().reshape(12, -1)
+        arms = self._select @ configuration.feet().ravel()
+        J = self._select @ configuration.feet_jacobians().reshape(18, -1)
         return Quadratic(*kernels.weighted_squares(J, arms - self._targets, self._weights))

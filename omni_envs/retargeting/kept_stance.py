@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.kinematics import Kinematics, Points
 from omni_envs.retargeting.limits import STANCE, RowLimit, Rows
 from omni_envs.retargeting.options import StanceOptions
@@ -18,6 +19,7 @@ TIP, HEART = 0, 1
 _FLAT = 5e-3  # m: where the heart of an anchored sole moves less, the foot does not roll
 _LANDING = 5e-4  # m: how far from its window a foot may land
 _RISE = 0.03  # m/s that any planted tip may rise or sink
+_TILT = 2e-3  # m that an anchored tip may rise when its foot tilts about its edge
 _SLID = 3.0  # tolerances: an anchored tip that left its window this far was forced to
 
 
@@ -37,12 +39,14 @@ class StanceWindows:
     """Where the feet of a whole clip may be.
 
     Attributes:
-        axes: (T, 2, 2, 2) unit vectors along and across each foot, in which windows are measured.
+        axes: (T, 2, 2, 3) unit vectors along and across each foot, in the surface under it, in
+            which windows are measured.
         centre: (T, 2, 2, 2) of the window: foot; tip or heart; along and across, m.
         slack: (T, 2, 2, 2) half width of the window, infinite for none, m.
         steps: (T, 2, 3) largest step of the tip since the previous frame, m, along x, y and z;
             infinite for none.
         heights: (T, 2) height of the tips in the motion, m.
+        ceiling: (T, 2) greatest height of the tips, infinite for none, m.
     """
 
     axes: np.ndarray
@@ -50,42 +54,50 @@ class StanceWindows:
     slack: np.ndarray
     steps: np.ndarray
     heights: np.ndarray
+    ceiling: np.ndarray
 
 
 def stance_windows(
-    feet: np.ndarray, tiers: np.ndarray, fps: float, options: StanceOptions
+    feet: np.ndarray, tiers: np.ndarray, human: HumanFeet, fps: float, options: StanceOptions
 ) -> StanceWindows:
     """Windows that hold anchored feet in the places they have in a motion.
 
     The tip of an anchored foot stays in one place and its heart within the range it had: where the
     motion rolled the foot over its toes it may roll, where it did not it may not. Planted tips that
-    are not anchored are slow, and all planted tips rise no faster than they did: lifting a foot off
-    a slope is slip.
+    are not anchored are slow, and all planted tips rise no faster than they did, the anchored ones
+    no higher: lifting a foot off a slope is slip.
 
     Args:
         feet: (T, 2, 2, 3) places of tip and heart of both feet, m.
         tiers: (T, 2) tiers of ``stance_tiers``.
+        human: What the human's feet do while they are anchored.
         fps: Frames per second.
         options: Settings.
     """
     frames = len(feet)
-    axes = np.broadcast_to(np.eye(2), (frames, 2, 2, 2)).copy()
+    axes = human.axes.copy()
     centre, slack = np.zeros((frames, 2, 2, 2)), np.full((frames, 2, 2, 2), np.inf)
     for foot in range(2):
         edges = np.flatnonzero(np.diff(tiers[:, foot] == ANCHORED, prepend=False, append=False))
         for start, end in edges.reshape(-1, 2):
             run = slice(int(start), int(end))
-            arm = (feet[run, foot, TIP] - feet[run, foot, HEART]).mean(axis=0)[:2]
+            arm = axes[start, foot] @ (feet[run, foot, TIP] - feet[run, foot, HEART]).mean(axis=0)
             x, y = arm / max(float(np.hypot(*arm)), 1e-9)
             turned = np.array([[x, y], [-y, x]]) if np.hypot(x, y) > 0.5 else np.eye(2)
-            places = feet[run, foot, :, :2] @ turned.T
+            turned = turned @ axes[start, foot]
+            places = feet[run, foot] @ turned.T
             axes[run, foot] = turned
             centre[run, foot, TIP], slack[run, foot, TIP] = _tip_window(places[:, TIP], options)
-            # Where the tip may be from where it began.
-            room = centre[run, foot, TIP][0] - places[0, TIP]
-            centre[run, foot, HEART], slack[run, foot, HEART] = _heart_window(
-                places[:, HEART], room, options
-            )
+            hearts, pivot = places[:, HEART], human.pivots[run, foot]
+            cuts = np.zeros(0, int)
+            if np.linalg.norm(hearts - hearts[0], axis=1).max() > _FLAT:
+                cuts = np.flatnonzero(np.diff(pivot)) + 1
+            for part in np.split(np.arange(len(pivot)), cuts):
+                # Where the tip may be from where it was at the start of the part.
+                room = centre[run, foot, TIP][0] - places[part[0], TIP]
+                centre[start + part, foot, HEART], slack[start + part, foot, HEART] = _heart_window(
+                    hearts[part], room, options, begins=part[0] == 0
+                )
     planted, anchored = tiers >= LOOSE, tiers == ANCHORED
     planted, anchored = (flags[1:] & flags[:-1] for flags in (planted, anchored))
     slow = options.loose_speed / fps / np.sqrt(2.0)  # half side of the square inside the circle
@@ -93,7 +105,9 @@ def stance_windows(
     steps = np.full((frames, 2, 3), np.inf)
     steps[1:, :, :2] = np.where(planted & ~anchored, slow, np.inf)[..., None]
     steps[1:, :, 2] = np.where(planted, rise, np.inf)
-    return StanceWindows(axes, centre, slack, steps, feet[:, :, TIP, 2])
+    heights, ceiling = feet[:, :, TIP, 2], np.full((frames, 2), np.inf)
+    ceiling[1:][anchored] = heights[1:][anchored] + _TILT
+    return StanceWindows(axes, centre, slack, steps, heights, ceiling)
 
 
 def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray, np.ndarray]:
@@ -108,7 +122,7 @@ def _tip_window(places: np.ndarray, options: StanceOptions) -> tuple[np.ndarray,
 
 
 def _heart_window(
-    places: np.ndarray, room: np.ndarray, options: StanceOptions
+    places: np.ndarray, room: np.ndarray, options: StanceOptions, begins: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """(F, 2) centres and half widths about the places of a heart: what it did since the start."""
     moved = places - places[0]
@@ -122,7 +136,8 @@ def _heart_window(
     low, high = np.minimum(low, room), np.maximum(high, room)
     half = np.repeat(np.maximum(0.5 * (high - low), options.tolerance)[None], len(places), axis=0)
     centre = np.repeat((places[0] + 0.5 * (low + high))[None], len(places), axis=0)
-    centre[0], half[0] = places[0], options.tolerance
+    if begins:
+        centre[0], half[0] = places[0], options.tolerance
     return centre, half
 
 
@@ -153,7 +168,7 @@ class KeptStance(RowLimit):
     def record(self, configuration: Kinematics) -> None:
         """Remembers where the frame has put the feet."""
         places = configuration.positions(self._points).reshape(2, 2, 3)
-        offset, slack = self._offsets(places[..., :2]), self._windows.slack[self._t]
+        offset, slack = self._offsets(places), self._windows.slack[self._t]
         beside = offset - np.clip(offset, -slack, slack)
         self._shift[self._landing] = np.clip(beside, -_LANDING, _LANDING)[self._landing]
         self._tips = places[:, TIP]
@@ -161,27 +176,34 @@ class KeptStance(RowLimit):
     def rows(self, configuration: Kinematics) -> Rows | None:
         """Returns rows for the windows and for the steps of slow tips."""
         t, windows = self._t, self._windows
-        slow = np.isfinite(windows.steps[t])
+        slow, low = np.isfinite(windows.steps[t]), np.isfinite(windows.ceiling[t])
         slack = windows.slack[t] + np.where(self._landing, _LANDING, 0.0)[:, None, None]
         held = np.isfinite(slack)
-        if not (held.any() or slow.any()):
+        if not (held.any() or slow.any() or low.any()):
             return None
         places = configuration.positions(self._points)
         jacobian = configuration.jacobians(self._points, places).transpose(1, 0, 2)
         places, jacobian = places.reshape(2, 2, 3), jacobian.reshape(2, 2, 3, -1)
-        offset = self._offsets(places[..., :2])[held]
+        offset = self._offsets(places)[held]
         moved, step = (places[:, TIP] - self._tips)[slow], windows.steps[t][slow]
         # A tip that a repair has lifted may always come back to the height it had: else every
         # repair of the next frames would lift it a little further.
         back = np.zeros((2, 3))
         back[:, 2] = np.minimum(windows.heights[t] - self._tips[:, 2], 0.0)
-        turned = windows.axes[t][:, None] @ jacobian[:, :, :2]
-        A = np.concatenate([turned[held], jacobian[:, TIP][slow]])
-        lower = np.concatenate([-slack[held] - offset, np.minimum(-step, back[slow]) - moved])
-        upper = np.concatenate([slack[held] - offset, step - moved])
+        turned = windows.axes[t][:, None] @ jacobian
+        room = (windows.ceiling[t] - places[:, TIP, 2])[low]
+        A = np.concatenate([turned[held], jacobian[:, TIP][slow], jacobian[low, TIP, 2]])
+        lower = np.concatenate(
+            [
+                -slack[held] - offset,
+                np.minimum(-step, back[slow]) - moved,
+                np.full(len(room), -np.inf),
+            ]
+        )
+        upper = np.concatenate([slack[held] - offset, step - moved, room])
         return Rows(A, lower, upper, np.full(len(lower), STANCE))
 
     def _offsets(self, places: np.ndarray) -> np.ndarray:
-        """(2, 2, 2) offsets of (2, 2, 2) places from the centres of their windows."""
+        """(2, 2, 2) offsets of (2, 2, 3) places from the centres of their windows."""
         axes, centre = self._windows.axes[self._t][:, None], self._windows.centre[self._t]
         return (axes @ places[..., None])[..., 0] - centre - self._shift

@@ -65,6 +65,12 @@ class Kinematics(mink.Configuration):
             [foot.body for foot in feet for _ in foot.sole],
             np.array([p for foot in feet for p in foot.sole]),
         )
+        toes = [_toes(foot) for foot in feet]
+        self._toes = Points(
+            model,
+            [foot.body for foot, points in zip(feet, toes, strict=True) for _ in points],
+            np.concatenate(toes),
+        )
         self._feet = Points(
             model,
             [foot.body for foot in feet for _ in range(3)],
@@ -133,6 +139,22 @@ class Kinematics(mink.Configuration):
         """(2, K, 3) world sole points, left foot first."""
         return self.positions(self._soles).reshape(2, -1, 3)
 
+    def toe_heights(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights of both feet along (2, 3) normals of what they stand on.
+
+        That of a foot is the height of its lowest sole point before the heart: the heel may hang
+        over an edge, and rise when the foot rolls onto its toes.
+
+        Returns:
+            (2,) heights over the plane through the origin, m, and their (2, nv) gradients.
+        """
+        toes = self.positions(self._toes).reshape(2, -1, 3)
+        heights = (toes @ normals[:, :, None])[..., 0]
+        lowest = np.argmin(heights, axis=1)
+        bodies = self._toes.bodies[:: toes.shape[1]]
+        jacobian = self.body_jacobians(bodies, toes[[0, 1], lowest])
+        return heights[[0, 1], lowest], np.einsum("fd,dfn->fn", normals, jacobian)
+
     def feet(self) -> np.ndarray:
         """(2, 3, 3) toe tip, and arms from there to the heart of the sole and to the left.
 
@@ -145,12 +167,12 @@ class Kinematics(mink.Configuration):
         return self._memory["feet"]
 
     def feet_jacobians(self) -> np.ndarray:
-        """(2, 3, 2, nv) Jacobians of what ``feet`` returns, x and y only."""
+        """(2, 3, 3, nv) Jacobians of what ``feet`` returns."""
         if "feet_jacobians" not in self._memory:
             points = self.feet().copy()
             points[:, 1:] += points[:, :1]
-            jacobian = self.jacobians(self._feet, points.reshape(6, 3))[:2]
-            jacobian = jacobian.reshape(2, 2, 3, -1).transpose(1, 2, 0, 3).copy()
+            jacobian = self.jacobians(self._feet, points.reshape(6, 3))
+            jacobian = jacobian.reshape(3, 2, 3, -1).transpose(1, 2, 0, 3).copy()
             jacobian[:, 1:] -= jacobian[:, :1]
             self._memory["feet_jacobians"] = jacobian
         return self._memory["feet_jacobians"]
@@ -169,6 +191,13 @@ class Kinematics(mink.Configuration):
         return kernels.contact_rows(
             data.cdof, data.subtree_com[self._root], self.ancestors, bodies, points, normals
         )
+
+
+def _toes(foot: Foot) -> np.ndarray:
+    """(K, 3) sole points before the heart, body frame."""
+    sole = np.array(foot.sole)
+    heart = sole[:-1].mean(axis=0)
+    return sole[(sole - heart) @ (sole[-1] - heart) > 0.0]
 
 
 def _foot_points(foot: Foot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

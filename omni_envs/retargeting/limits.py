@@ -10,8 +10,11 @@ import numpy as np
 
 from omni_envs.retargeting.kinematics import Kinematics
 
-STANCE, SELF, CONTACT = 0, 1, 2
-"""Kinds of rows, the first to give way first (the order of ``result.RELAXATIONS``)."""
+STANCE, SELF, CONTACT, FOOTING = 0, 1, 2, 3
+"""Kinds of rows: the constraints, the first to give way first (the order of
+``result.RELAXATIONS``), and what is only wished of feet, which gives way before all of them: the
+way to a planned foothold (a foot that cannot reach it lands beside it rather than pull the other
+foot away), and that a standing foot stays down."""
 
 
 class Rows(NamedTuple):
@@ -21,7 +24,7 @@ class Rows(NamedTuple):
         A: (N, nv).
         lower: (N,).
         upper: (N,).
-        kind: (N,) ``STANCE``, ``SELF`` or ``CONTACT``.
+        kind: (N,) ``STANCE``, ``SELF``, ``CONTACT`` or ``FOOTING``.
     """
 
     A: np.ndarray

@@ -43,8 +43,8 @@ class Restored(NamedTuple):
 
 
 def row_violations(rows: Rows) -> tuple[float, float, float]:
-    """Largest violation at dq = 0 by kind, m."""
-    stance, own, contact = kernels.worst_violations(*rows[1:], kinds=len(KINDS)).tolist()
+    """Largest violation at dq = 0 by kind of constraint, m."""
+    stance, own, contact, _ = kernels.worst_violations(*rows[1:], kinds=len(KINDS) + 1).tolist()
     return stance, own, contact
 
 

@@ -28,6 +28,7 @@ from omni_envs.retargeting.contact_task import ContactTask
 from omni_envs.retargeting.first_frame import aligned_poses
 from omni_envs.retargeting.foothold_task import FootholdTask
 from omni_envs.retargeting.frame_solver import FrameResult, FrameSolver
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.interaction_mesh import InteractionMesh
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
@@ -324,7 +325,7 @@ class _Retargeter:
         every = np.unique(
             np.append(np.arange(0, source.num_frames, _STRIDE), source.num_frames - 1)
         )
-        feet = np.empty((len(every), 2, 3, 2))
+        feet = np.empty((len(every), 2, 3, 3))
         for i, t in enumerate(every):
             self._place(t)
             if i == 0:
@@ -337,7 +338,7 @@ class _Retargeter:
                 q = self.solver.solve(
                     q, options.iterations // 2, radius, 10 * options.convergence, restore=False
                 ).q
-            feet[i] = self.configuration.feet()[:, :, :2]
+            feet[i] = self.configuration.feet()
         wishes = foot_wishes(feet)
         # Between these frames the feet follow the human's toes: the offset changes slowly.
         human = source.keypoints[:, [KEYPOINTS.index(f"{side}_toe") for side in SIDES], :2]
@@ -347,16 +348,18 @@ class _Retargeter:
             _interpolate(frames, every, wishes.headings),
             _interpolate(frames, every, wishes.reach),
             _interpolate(frames, every, wishes.lying),
+            wishes.length,
         )
         tier = stance_tiers(source, self.options.stance)
         if self.nominal_motion is not None:
             # The paper's p_0^F = p̄_0^F: feet that stand on frame 0 stand where the nominal ones do.
             self.configuration.update(self.nominal_motion[0])
-            start = foot_wishes(self.configuration.feet()[None, :, :, :2])
+            start = foot_wishes(self.configuration.feet()[None])
             standing = np.logical_and.accumulate(tier == ANCHORED)
             first = self.nominal_motion[0]
             wishes.tips[standing] = np.broadcast_to(start.tips, wishes.tips.shape)[standing]
             turn = start.headings - wishes.headings[:1]
             same = start.headings - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
             wishes.headings[standing] = np.broadcast_to(same, tier.shape)[standing]
-        return plan_stance(tier, wishes, source.fps, self.options.stance), first
+        feet_of_human = HumanFeet.of(source, tier == ANCHORED)
+        return plan_stance(tier, wishes, feet_of_human, source.fps, self.options.stance), first

@@ -5,8 +5,8 @@ foot still settles. A foothold in the middle of where the foot would like to be 
 interval costs a tenth of the deformation energy. So a coarse pass without stance finds the wishes,
 and the plan keeps
 
-* the toe tip of an *anchored* foot in one place, and by ``StanceLimit`` the whole sole, but where
-  the human rolls or turns the foot far on its toes;
+* the toe tip of an *anchored* foot in one place, and by ``StanceLimit`` the whole sole, but while
+  the human rolls or turns the foot on its toes and the robot would have to do so far;
 * the toe tip of a *loose* foot below a speed;
 * consecutive footholds within reach of each other.
 """
@@ -20,20 +20,25 @@ import daqp
 import numpy as np
 
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.options import StanceOptions
 
 FREE, LOOSE, ANCHORED = 0, 1, 2
 """Tiers of a foot in a frame."""
 
+LIFT = 2e-3
+"""How far a standing foot may lift off, m."""
+
 # Speeds by which a free foot may be asked to leave its way for the next foothold.
 _DETOUR = 0.6  # m/s
 _FUNNEL = 0.15  # m: no window wider than this
 _FLAT = 3e-3  # m: a stance whose arm from tip to heart changes less, seen from above, does not roll
-# An upright foot that would turn (rad) or roll (change of the arm from above, m) by more than this
-# while it stands is let, the toe tip in its place: to stand flat and still would contort the robot
-# (bear crawl up a slope: a quarter more energy, three times its maximum). A foot that lies on its
-# side or back, as in a crawl, has no weight on its sole and is held whole at little cost.
-_TURN, _ROLL = 1.5, 0.03
+# An upright foot that would turn (rad) or roll (change of the arm from above, in lengths of the
+# sole) by more than this while it stands does so while the human's foot pivots, the toe tip in its
+# place: to stand flat and still would contort the robot (bear crawl up a slope: a quarter more
+# energy, three times its maximum). A foot that lies on its side or back, as in a crawl, has no
+# weight on its sole and is held whole at little cost.
+_TURN, _ROLL = 1.5, 0.3
 _UPRIGHT = 0.8  # least horizontal part of the unit axis to the left of an upright foot
 _LYING = 0.9  # least horizontal part of the unit axis to the left with which a foot has a heading
 # Pull of the planned heading on a landing foot: frames before landing that feel it, and its weight.
@@ -50,12 +55,14 @@ class FootWishes:
         reach: (T, 2) horizontal distance from tip to heart of the sole along the heading, m;
             negative.
         lying: (T, 2) length of the horizontal part of the unit axis to the left.
+        length: (2,) from toe tip to heart of the sole, m.
     """
 
     tips: np.ndarray
     headings: np.ndarray
     reach: np.ndarray
     lying: np.ndarray
+    length: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +71,11 @@ class StancePlan:
 
     Attributes:
         tier: (T, 2) ``FREE``, ``LOOSE`` or ``ANCHORED``.
-        turns: (T, 2) the foot turns on its toes while it stands: its heading is free.
-        rolls: (T, 2) the foot rolls over its toes while it stands: its pitch is free.
+        turns: (T, 2) the foot turns on its toes: its heading is free.
+        rolls: (T, 2) the foot rolls over its toes: its pitch is free.
+        rise: (T, 2) how far the foot may be above its lowest place in this stance so far, m;
+            infinite where the foot lies on its side or back.
+        axes: (T, 2, 2, 3) unit vectors along which a standing foot must not move.
         tips: (T, 2, 2) horizontal place of the toe tip, m.
         tip_slack: (T, 2) half width of its window, infinite for none: the tolerance on the
             foothold, and before it what the foot can still go, m.
@@ -79,6 +89,8 @@ class StancePlan:
     tier: np.ndarray
     turns: np.ndarray
     rolls: np.ndarray
+    rise: np.ndarray
+    axes: np.ndarray
     tips: np.ndarray
     tip_slack: np.ndarray
     tip_step: np.ndarray
@@ -88,12 +100,15 @@ class StancePlan:
 
 
 def foot_wishes(feet: np.ndarray) -> FootWishes:
-    """Wishes of (T, 2, 3, 2) feet, as ``Kinematics.feet`` returns them, x and y only."""
+    """Wishes of (T, 2, 3, 3) feet, as ``Kinematics.feet`` returns them."""
+    length = np.linalg.norm(feet[:, :, 1], axis=-1).mean(axis=0)
+    feet = feet[..., :2]
     left = feet[:, :, 2]
     headings = np.unwrap(np.arctan2(-left[..., 0], left[..., 1]), axis=0)
     forward = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
     reach = (feet[:, :, 1] * forward).sum(axis=2)
-    return FootWishes(feet[:, :, 0], headings, reach, 10.0 * np.linalg.norm(left, axis=-1))
+    lying = 10.0 * np.linalg.norm(left, axis=-1)
+    return FootWishes(feet[:, :, 0], headings, reach, lying, length)
 
 
 def stance_tiers(source: SourceMotion, options: StanceOptions) -> np.ndarray:
@@ -108,13 +123,14 @@ def stance_tiers(source: SourceMotion, options: StanceOptions) -> np.ndarray:
 
 
 def plan_stance(
-    tier: np.ndarray, wishes: FootWishes, fps: float, options: StanceOptions
+    tier: np.ndarray, wishes: FootWishes, human: HumanFeet, fps: float, options: StanceOptions
 ) -> StancePlan:
     """Chooses footholds near the wishes and the windows that lead to them.
 
     Args:
         tier: (T, 2) tier of each foot on each frame.
         wishes: Where the feet would be without stance.
+        human: What the human's feet do in these tiers.
         fps: Frames per second.
         options: Settings.
     """
@@ -128,6 +144,7 @@ def plan_stance(
     tip_slack = np.full(tier.shape, np.inf)
     arms, arm_weights = np.zeros((*tier.shape, 2)), np.zeros((*tier.shape, 2))
     turns, rolls = np.zeros(tier.shape, bool), np.zeros(tier.shape, bool)
+    rise = np.full(tier.shape, np.inf)
     for foot in range(2):
         runs = _runs(tier[:, foot] == ANCHORED)
         if not runs:
@@ -140,18 +157,41 @@ def plan_stance(
         for start, end in runs:
             wish, reach = wishes.headings[start:end, foot], wishes.reach[start:end, foot]
             lying = wishes.lying[start:end, foot].min()
-            turns[start:end, foot] = lying >= _UPRIGHT and np.ptp(wish) > _TURN
-            rolls[start:end, foot] = lying >= _UPRIGHT and np.ptp(reach) > _ROLL
-            if turns[start, foot] or lying < _LYING:
+            rise[start:end, foot] = human.rise[start:end, foot] if lying >= _UPRIGHT else np.inf
+            pivots = human.pivots[start:end, foot] & (lying >= _UPRIGHT)
+            turning, rolling = np.ptp(wish) > _TURN, np.ptp(reach) > _ROLL * wishes.length[foot]
+            turns[start:end, foot], rolls[start:end, foot] = pivots & turning, pivots & rolling
+            if lying < _LYING:
                 continue
-            first = max(start - _APPROACH, 0)
-            headings[first:end, foot] = wish.mean()
-            arm_weights[first:end, foot, 1] = _PULL
-            if np.ptp(reach) <= _FLAT:
-                arms[first:end, foot, 0] = np.median(reach)
-                arm_weights[first + _APPROACH // 2 : end, foot, 0] = _PULL
+            first, turned, rolled = (
+                max(start - _APPROACH, 0),
+                _first(turns[start:end, foot]),
+                _first(rolls[start:end, foot]),
+            )
+            headings[first : start + turned, foot] = wish[: max(turned, 1)].mean()
+            arm_weights[first : start + turned, foot, 1] = _PULL
+            if np.ptp(reach[: max(rolled, 1)]) <= _FLAT:
+                arms[first : start + rolled, foot, 0] = np.median(reach[: max(rolled, 1)])
+                arm_weights[first + _APPROACH // 2 : start + rolled, foot, 0] = _PULL
     forward = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
-    return StancePlan(tier, turns, rolls, tips, tip_slack, tip_step, forward, arms, arm_weights)
+    return StancePlan(
+        tier=tier,
+        turns=turns,
+        rolls=rolls,
+        rise=rise,
+        axes=human.axes,
+        tips=tips,
+        tip_slack=tip_slack,
+        tip_step=tip_step,
+        forward=forward,
+        arms=arms,
+        arm_weights=arm_weights,
+    )
+
+
+def _first(mask: np.ndarray) -> int:
+    """Index of the first True, the length where there is none."""
+    return int(np.argmax(mask)) if mask.any() else len(mask)
 
 
 def _runs(mask: np.ndarray) -> list[tuple[int, int]]:

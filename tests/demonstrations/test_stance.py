@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from omni_envs.demonstrations import stance_intervals, stance_schedule
+from omni_envs.demonstrations.stance import pivot_schedule
 from omni_envs.errors import InvalidDataError, UnknownNameError
 
 FPS = 30.0
@@ -38,6 +39,35 @@ def test_rate_is_respected():
 def test_intervals():
     assert stance_intervals(np.array([1, 1, 0, 1, 0, 0, 1], bool)) == [(0, 2), (3, 4), (6, 7)]
     assert stance_intervals(np.zeros(3, bool)) == []
+
+
+def foot(pitch, heading=0.0):
+    """(T, 3) vectors from toe to ankle of a foot with these angles, degrees."""
+    pitch, heading = np.broadcast_arrays(np.deg2rad(pitch), np.deg2rad(heading))
+    level = np.stack([-np.cos(heading), -np.sin(heading)], axis=-1)
+    return np.concatenate([np.cos(pitch)[:, None] * level, np.sin(pitch)[:, None]], axis=1)
+
+
+def test_a_foot_that_keeps_its_direction_does_not_pivot():
+    pitch = 25.0 + 6.0 * np.sin(np.arange(90))
+    assert not pivot_schedule(foot(pitch), np.ones(90, bool), FPS).any()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_roll_or_turn_splits_a_stance_into_parts(turned):
+    angle = np.concatenate([np.zeros(40), np.linspace(0, 40, 20), np.full(40, 40.0)])
+    directions = foot(20.0, 1.2 * angle) if turned else foot(20.0 + angle)
+    pivots = pivot_schedule(directions, np.ones(100, bool), FPS)
+    ((start, stop),) = stance_intervals(pivots)
+    assert 40 < start < 46 and 56 < stop <= 60  # from 5° on, until 5° before it rests
+
+
+def test_a_roll_that_does_not_come_to_rest_lasts_to_the_end_of_the_stance():
+    pitch = np.concatenate([np.full(30, 20.0), np.linspace(20, 80, 30)])
+    stance = np.arange(60) < 55
+    pivots = pivot_schedule(foot(pitch), stance, FPS)
+    assert stance_intervals(pivots) == [(33, 55)]
+    assert not pivot_schedule(foot(pitch), stance & False, FPS).any()
 
 
 def test_bad_input():

@@ -24,7 +24,7 @@ def test_every_bar_is_on_a_headline_figure(standing):
 
 
 def test_the_table_marks_what_fails():
-    bad = GOOD | {"stance_drift_max_m": 0.0123, "contact_clean_fraction": None}
+    bad = GOOD | {"stance_still_drift_max_m": 0.0123, "contact_clean_fraction": None}
     console = Console(width=160, record=True, file=io.StringIO())
     console.print(bars_table({"good": GOOD, "bad": bad}))
     lines = console.export_text().splitlines()

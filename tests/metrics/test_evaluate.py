@@ -18,6 +18,7 @@ KEYS = [
     "slip_fraction_default",
     "slip_max_code_m_s",
     "stance_drift_max_m",
+    "stance_still_drift_max_m",
     "stance_pivot_drift_max_m",
     "self_penetration_max_m",
     "joint_violation_max_rad",
@@ -72,6 +73,7 @@ def test_every_fault_shows_up_in_its_own_figure(standing, make_source):
     assert summary["slip_max_code_m_s"] == pytest.approx(0.2, abs=1e-7)
     assert summary["slip_fraction_default"] == pytest.approx(1 / 29)
     assert summary["stance_drift_max_m"] == pytest.approx(0.004, abs=1e-7)
+    assert summary["stance_still_drift_max_m"] == pytest.approx(0.004, abs=1e-7)
     assert summary["penetration_max_m"] == pytest.approx(0.02, abs=1e-6)
     assert summary["penetration_fraction_1mm"] == pytest.approx(1 / 30)
     assert summary["joint_violation_max_rad"] == pytest.approx(0.1)

@@ -44,11 +44,27 @@ def test_slip_is_the_speed_along_the_ground():
 def test_rolling_over_the_toe_is_neither_slip_nor_pivot_drift():
     soles = rolled(np.linspace(0, 0.6, 10), SOLE[-1])
     assert slip_speed(soles, up(10), 50.0).max() < 1e-9
-    centre, pivot = stance_drift(soles, up(10), np.ones((10, 2), bool))
+    stance = np.ones((10, 2), bool)
+    centre, still, pivot = stance_drift(soles, up(10), stance, stance & False)
     assert pivot.max() < 1e-9
+    np.testing.assert_array_equal(still, centre)  # the human did not roll
     arm = SOLE[-1, 0] - SOLE[:-1, 0].mean()
     expected = arm * (1 - np.cos(np.linspace(0, 0.6, 10)))
     np.testing.assert_allclose(centre[:, 0], expected, atol=1e-9)
+
+
+def test_what_rolls_with_the_human_is_still_before_and_after():
+    angles = np.concatenate([np.zeros(4), np.linspace(0, 0.6, 5)[1:-1], np.full(4, 0.6)])
+    soles = rolled(angles, SOLE[-1])
+    soles[9:, :, :, 0] += 0.003
+    stance, pivots = np.ones((11, 2), bool), np.zeros((11, 2), bool)
+    pivots[4:7] = True
+    centre, still, pivot = stance_drift(soles, up(11), stance, pivots)
+    assert np.isnan(still[4:7]).all()
+    np.testing.assert_allclose(still[[0, 3, 7, 8], 0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(still[9:, 0], 0.003, atol=1e-9)
+    np.testing.assert_allclose(pivot[9:, 0], 0.003, atol=1e-9)
+    assert centre[7:, 0].min() > 0.015
 
 
 def test_turning_on_the_spot_slips_like_its_slowest_point():
@@ -75,7 +91,7 @@ def test_drift_counts_from_the_start_of_each_interval():
     soles[..., 0] += np.array([0, 1, 2, 4, 5, 9])[:, None, None] * 0.01
     stance = np.zeros((6, 2), bool)
     stance[[0, 1, 3, 4, 5], 0] = True
-    for drift in stance_drift(soles, up(6), stance):
+    for drift in stance_drift(soles, up(6), stance, stance & False):
         np.testing.assert_allclose(drift[:, 0], [0, 0.01, np.nan, 0, 0.01, 0.05], atol=1e-12)
         assert np.isnan(drift[:, 1]).all()
 

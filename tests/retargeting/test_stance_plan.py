@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.options import StanceOptions
 from omni_envs.retargeting.stance_plan import (
     ANCHORED,
@@ -22,7 +23,19 @@ def wishes(tips, headings=None, reach=None, lying=1.0):
         np.zeros((frames, 2)) if headings is None else np.stack([headings] * 2, axis=1),
         np.full((frames, 2), -0.1) if reach is None else np.stack([reach] * 2, axis=1),
         np.full((frames, 2), lying),
+        np.full(2, 0.1),
     )
+
+
+def human(frames, pivots=slice(0, 0)):
+    flags = np.zeros((frames, 2), bool)
+    flags[pivots] = True
+    axes = np.tile(np.eye(3)[:2], (frames, 2, 1, 1))
+    return HumanFeet(flags, np.zeros((frames, 2)), axes)
+
+
+def plan_of(tier, wished, pivots=slice(0, 0)):
+    return plan_stance(tier, wished, human(len(tier), pivots), 30.0, OPTIONS)
 
 
 def tiers(left):
@@ -34,7 +47,7 @@ def test_foothold_is_the_middle_of_the_wishes():
     tips[5:15, 0] = np.linspace(0.0, 0.02, 10)
     tier = np.full(20, FREE)
     tier[5:15] = ANCHORED
-    plan = plan_stance(tiers(tier), wishes(tips), 30.0, OPTIONS)
+    plan = plan_of(tiers(tier), wishes(tips))
     np.testing.assert_allclose(plan.tips[5:15, 0, 0], 0.01)
     np.testing.assert_allclose(plan.tip_slack[5:15, 0], OPTIONS.tolerance)
     # The window before it narrows towards it.
@@ -48,29 +61,35 @@ def test_footholds_a_loose_foot_cannot_walk_are_drawn_together():
     tips[12:, 0] = 0.1
     tier = np.full(20, LOOSE)
     tier[:8] = tier[12:] = ANCHORED
-    plan = plan_stance(tiers(tier), wishes(tips), 30.0, OPTIONS)
+    plan = plan_of(tiers(tier), wishes(tips))
     step = OPTIONS.loose_speed / 30 / np.sqrt(2)
     assert plan.tips[15, 0, 0] - plan.tips[3, 0, 0] == pytest.approx(5 * step)
 
 
-def test_far_turns_and_rolls_are_let():
-    tier = tiers(np.full(30, ANCHORED))
-    still = plan_stance(tier, wishes(np.zeros((30, 2))), 30.0, OPTIONS)
+def test_far_turns_and_rolls_are_let_while_the_human_pivots():
+    tier, late = tiers(np.full(30, ANCHORED)), slice(20, 30)
+    still = plan_of(tier, wishes(np.zeros((30, 2))), late)
     assert not still.turns.any() and not still.rolls.any()
-    turn = plan_stance(
-        tier, wishes(np.zeros((30, 2)), headings=np.linspace(0, 2, 30)), 30.0, OPTIONS
-    )
-    assert turn.turns[:, 0].all() and not turn.turns[:, 1].any()
-    roll = plan_stance(
-        tier, wishes(np.zeros((30, 2)), reach=np.linspace(-0.1, -0.05, 30)), 30.0, OPTIONS
-    )
-    assert roll.rolls[:, 0].all()
+    far_turn = wishes(np.zeros((30, 2)), headings=np.linspace(0, 2, 30))
+    far_roll = wishes(np.zeros((30, 2)), reach=np.linspace(-0.1, -0.05, 30))
+    turn, roll = plan_of(tier, far_turn, late), plan_of(tier, far_roll, late)
+    for let in (turn.turns, roll.rolls):
+        assert let[late, 0].all() and not let[:20].any() and not let[:, 1].any()
+    for wished in (far_turn, far_roll):
+        held = plan_of(tier, wished)
+        assert not held.turns.any() and not held.rolls.any()
+
+
+def test_a_foot_that_lies_may_rise():
+    tier = tiers(np.full(30, ANCHORED))
+    assert not plan_of(tier, wishes(np.zeros((30, 2)))).rise[:, 0].any()
+    assert np.isinf(plan_of(tier, wishes(np.zeros((30, 2)), lying=0.5)).rise).all()
 
 
 def test_feet_on_their_side_are_held_whole():
     tier = tiers(np.full(30, ANCHORED))
     far = {"headings": np.linspace(0, 2, 30), "reach": np.linspace(-0.1, -0.05, 30)}
-    plan = plan_stance(tier, wishes(np.zeros((30, 2)), **far, lying=0.5), 30.0, OPTIONS)
+    plan = plan_of(tier, wishes(np.zeros((30, 2)), **far, lying=0.5), slice(0, 30))
     assert not plan.turns.any() and not plan.rolls.any()
 
 

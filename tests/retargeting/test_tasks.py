@@ -38,6 +38,8 @@ def foothold_task():
         tier=np.zeros((frames, feet), int),
         turns=np.zeros((frames, feet), bool),
         rolls=np.zeros((frames, feet), bool),
+        rise=np.zeros((frames, feet)),
+        axes=np.zeros((frames, feet, 2, 3)),
         tips=np.zeros((frames, feet, 2)),
         tip_slack=np.zeros((frames, feet)),
         tip_step=np.zeros((frames, feet)),
