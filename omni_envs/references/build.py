@@ -23,6 +23,7 @@ from omni_envs.references.reference import Reference
 from omni_envs.retargeting import RetargetOptions, refine, retarget
 from omni_envs.robots import KEYPOINTS, Robot, get_robot
 from omni_envs.scenes import OBJECT
+from omni_envs.threads import one_maths_thread_here
 
 STANCE = "default"
 """The stance set that a reference carries as its schedule."""
@@ -82,11 +83,12 @@ def make_reference(
             options = replace(options, nominal_decay=None)
         _check_ground(original, source)
         _check_robot(robot, source, anchor)
-    motion = retarget(
-        source, robot, options, _share(progress, source.num_frames, 0, passes), nominal=anchor
-    )
-    if options.refine:
-        motion = refine(motion, progress=_share(progress, source.num_frames, 1, passes))
+    with one_maths_thread_here():
+        motion = retarget(
+            source, robot, options, _share(progress, source.num_frames, 0, passes), nominal=anchor
+        )
+        if options.refine:
+            motion = refine(motion, progress=_share(progress, source.num_frames, 1, passes))
     report = evaluate(
         robot,
         motion.source.scene,
