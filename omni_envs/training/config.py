@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
-from math import inf
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
+from omni_envs.training.checks import known, positive, whole_number, within
 
 CONFIG_FILE = "config.json"
 TRAINERS = ("sb3", "torchrl")
@@ -66,21 +65,25 @@ class PPOConfig:
 
     def __post_init__(self) -> None:
         for name in ("rollout_steps", "epochs", "minibatches"):
-            _within(
+            within(
                 "PPOConfig", name, getattr(self, name), "a whole number from 1 on", 1, whole=True
             )
         for name in ("learning_rate", "initial_std", "clip", "max_grad_norm"):
-            _positive("PPOConfig", name, getattr(self, name))
+            positive("PPOConfig", name, getattr(self, name))
         for name in _FROM_ZERO:
-            _within("PPOConfig", name, getattr(self, name), "0 or more", 0.0)
+            within("PPOConfig", name, getattr(self, name), "0 or more", 0.0)
         for name in ("gamma", "gae_lambda"):
-            _within("PPOConfig", name, getattr(self, name), "from 0 to 1", 0.0, 1.0)
+            within("PPOConfig", name, getattr(self, name), "from 0 to 1", 0.0, 1.0)
         if self.adapt_every not in ("minibatch", "update"):
             raise InvalidOptionError(
                 f"PPOConfig: adapt_every must be 'minibatch' or 'update'; got {self.adapt_every!r}."
             )
         widths = self.hidden
-        if not isinstance(widths, tuple) or not widths or any(not _whole(w, 1) for w in widths):
+        if (
+            not isinstance(widths, tuple)
+            or not widths
+            or any(not whole_number(w, 1) for w in widths)
+        ):
             raise InvalidOptionError(f"PPOConfig: hidden must be widths ≥ 1; got {self.hidden}.")
 
 
@@ -126,9 +129,9 @@ class TrainConfig:
 
     def __post_init__(self) -> None:
         for name in ("steps", "num_envs", "checkpoint_every", "evaluation_episodes"):
-            _positive("TrainConfig", name, getattr(self, name))
+            positive("TrainConfig", name, getattr(self, name))
         for name in ("num_threads", "seed", "time_limit"):
-            _within("TrainConfig", name, getattr(self, name), "0 or more", 0.0)
+            within("TrainConfig", name, getattr(self, name), "0 or more", 0.0)
         if self.trainer not in TRAINERS:
             raise InvalidOptionError(
                 f"TrainConfig: trainer must be 'sb3' or 'torchrl'; got {self.trainer!r}."
@@ -160,9 +163,9 @@ class TrainConfig:
         Raises:
             InvalidOptionError: A field is unknown, missing or not allowed.
         """
-        _known("TrainConfig", data, cls)
+        known("TrainConfig", data, cls)
         ppo = dict(data.get("ppo", {}))
-        _known("TrainConfig.ppo", ppo, PPOConfig)
+        known("TrainConfig.ppo", ppo, PPOConfig)
         if "hidden" in ppo:
             widths = ppo["hidden"]
             ppo["hidden"] = tuple(widths) if isinstance(widths, list | tuple) else widths
@@ -173,40 +176,9 @@ class TrainConfig:
 
     def command(self) -> str:
         """Returns the command that repeats this run: a recipe, and what differs from it."""
-        flags: dict[str, Any] = {
-            "env": self.env,
-            "trainer": self.trainer,
-            "steps": self.steps,
-            "time-limit": self.time_limit,
-            "seed": self.seed,
-            "device": self.device,
-            "episodes": self.evaluation_episodes,
-            "out": self.out,
-        }
-        recipe, changes = self._recipe()
-        for name, value in changes.items():
-            text = value if name == "num_envs" else json.dumps(value)
-            flags[name.replace("_", "-")] = text
-        words = [word for flag, value in flags.items() for word in (f"--{flag}", str(value))]
-        return shlex.join(["python", "train.py", "--recipe", recipe, *words])
+        from omni_envs.training.command import command
 
-    def _recipe(self) -> tuple[str, dict[str, Any]]:
-        """Returns the recipe from which the fewest words lead here, and the changes to it."""
-        from omni_envs.training.recipes import RECIPES
-
-        data = self.to_dict()
-        ways = []
-        for name, recipe in RECIPES.items():
-            base = recipe.config(self.env, self.out, self.steps).to_dict()
-            changes = {key: data[key] for key in _OF_A_RECIPE if data[key] != base[key]}
-            if "ppo" in changes:
-                ppo = data["ppo"].items()
-                changes["ppo"] = {k: value for k, value in ppo if value != base["ppo"][k]}
-            again = recipe.config(self.env, self.out, self.steps, **changes).to_dict()
-            # Options are laid over a recipe's: what it has and this run has not cannot be undone.
-            exact = all(again[key] == data[key] for key in _OF_A_RECIPE)
-            ways.append((not exact, len(json.dumps(changes)), name, changes))
-        return min(ways, key=lambda way: way[:2])[2:]
+        return command(self)
 
     def save(self, run: Path | None = None) -> Path:
         """Writes ``config.json`` into a run directory, by default its own."""
@@ -236,7 +208,6 @@ class TrainConfig:
 _FROM_ZERO = (
     "critic_learning_rate", "desired_kl", "value_clip", "value_weight", "entropy_weight",
 )  # fmt: skip
-_OF_A_RECIPE = ("num_envs", "env_options", "training_options", "ppo")
 
 
 def merged(options: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -261,37 +232,3 @@ def _beside(run: Path, options: Mapping[str, Any]) -> Mapping[str, Any]:
         return options
     several = isinstance(reference, list)
     return {**options, "reference": [*map(placed, reference)] if several else placed(reference)}
-
-
-def _positive(owner: str, name: str, value: Any) -> None:
-    if not _number(value) or not 0 < value < inf:
-        raise InvalidOptionError(f"{owner}: {name} must be positive; got {value!r}.")
-
-
-def _within(
-    owner: str,
-    name: str,
-    value: Any,
-    words: str,
-    low: float,
-    high: float = inf,
-    whole: bool = False,
-) -> None:
-    good = _whole(value, low) if whole else _number(value) and low <= value <= high
-    if not good or value == inf:
-        raise InvalidOptionError(f"{owner}: {name} must be {words}; got {value!r}.")
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _whole(value: Any, low: float) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= low
-
-
-def _known(owner: str, data: Mapping[str, Any], cls: type) -> None:
-    valid = {f.name for f in fields(cls)}
-    unknown = sorted(set(data) - valid)
-    if unknown:
-        raise InvalidOptionError(f"{owner}: unknown {unknown}. Valid: {', '.join(sorted(valid))}.")

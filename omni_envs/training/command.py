@@ -1,0 +1,49 @@
+"""The command that repeats a run."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from typing import Any
+
+from omni_envs.training.config import TrainConfig
+from omni_envs.training.recipes import RECIPES
+
+_OF_A_RECIPE = ("num_envs", "env_options", "training_options", "ppo")
+
+
+def command(config: TrainConfig) -> str:
+    """Returns the command that repeats this run: a recipe, and what differs from it."""
+    flags: dict[str, Any] = {
+        "env": config.env,
+        "trainer": config.trainer,
+        "steps": config.steps,
+        "time-limit": config.time_limit,
+        "seed": config.seed,
+        "device": config.device,
+        "episodes": config.evaluation_episodes,
+        "out": config.out,
+    }
+    recipe, changes = _recipe(config)
+    for name, value in changes.items():
+        text = value if name == "num_envs" else json.dumps(value)
+        flags[name.replace("_", "-")] = text
+    words = [word for flag, value in flags.items() for word in (f"--{flag}", str(value))]
+    return shlex.join(["python", "train.py", "--recipe", recipe, *words])
+
+
+def _recipe(config: TrainConfig) -> tuple[str, dict[str, Any]]:
+    """Returns the recipe from which the fewest words lead here, and the changes to it."""
+    data = config.to_dict()
+    ways = []
+    for name, recipe in RECIPES.items():
+        base = recipe.config(config.env, config.out, config.steps).to_dict()
+        changes = {key: data[key] for key in _OF_A_RECIPE if data[key] != base[key]}
+        if "ppo" in changes:
+            ppo = data["ppo"].items()
+            changes["ppo"] = {k: value for k, value in ppo if value != base["ppo"][k]}
+        again = recipe.config(config.env, config.out, config.steps, **changes).to_dict()
+        # Options are laid over a recipe's: what it has and this run has not cannot be undone.
+        exact = all(again[key] == data[key] for key in _OF_A_RECIPE)
+        ways.append((not exact, len(json.dumps(changes)), name, changes))
+    return min(ways, key=lambda way: way[:2])[2:]
