@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,10 +13,10 @@ from gymnasium.vector import VectorEnv
 from omni_envs.progress import ProgressCallback
 from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.environment import make_env
+from omni_envs.training.evaluation import Evaluation, MotionEvaluation
 from omni_envs.training.rollout import Episodes, Policy, play
 from omni_envs.training.statistics import wilson_interval
 
-EVALUATION_FILE = "evaluation.json"
 WINDOW_SECONDS, WINDOWS = 3.0, 64
 CARRIED = 0.25
 """Distance within which an object counts as carried, m."""
@@ -25,82 +24,6 @@ EVALUATION_MODELS = 1
 """Seed of the randomized models of an evaluation (``RandomizationConfig.seed``): training has 0."""
 UNCLIPPED = 1e3
 """Action limit of environments that a policy file acts in: clipping is part of the file."""
-
-
-@dataclass(frozen=True)
-class MotionEvaluation:
-    """Figures of one of several motions; see ``Evaluation``.
-
-    Attributes:
-        motion: Its place in the order given.
-        episodes: Episodes of it.
-        success_rate: Share of them that hit no termination criterion.
-        success_ci95: Its 95 % confidence interval (Wilson).
-        episode_length_mean: Control steps.
-        episode_length_possible: Control steps of the whole motion.
-    """
-
-    motion: int
-    episodes: int
-    success_rate: float
-    success_ci95: tuple[float, float]
-    episode_length_mean: float
-    episode_length_possible: int
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """Figures of a policy; an episode runs from the motion's first frame to its end.
-
-    Attributes:
-        success_rate: Share of episodes that hit no termination criterion, under the evaluation
-            randomization.
-        success_ci95: Its 95 % confidence interval (Wilson).
-        carried_rate: Share of episodes that succeed with the object never further than 0.25 m from
-            its reference, stricter than the task; None without an object.
-        episodes: Number of episodes.
-        episode_length_mean: Control steps.
-        episode_length_possible: Control steps of a whole motion, of the longest of several.
-        return_mean: Undiscounted return per episode.
-        body_error_mean_m: Distance of the tracked bodies from the re-aligned reference, m.
-        window_survival_rate: Share of noise-free windows, spread evenly over the motion, that hit
-            no termination criterion.
-        window_seconds_mean: Mean time alive in a window, s.
-        window_body_error_mean_m: As ``body_error_mean_m``, in the windows.
-        windows: Number of windows.
-        window_seconds: Length of a window, s.
-        steps: Control steps that the policy was trained for.
-        seconds: Its training time.
-        motions: Each motion by itself where there are several, which take turns in the episodes.
-    """
-
-    success_rate: float
-    success_ci95: tuple[float, float]
-    carried_rate: float | None
-    episodes: int
-    episode_length_mean: float
-    episode_length_possible: int
-    return_mean: float
-    body_error_mean_m: float
-    window_survival_rate: float
-    window_seconds_mean: float
-    window_body_error_mean_m: float
-    windows: int
-    window_seconds: float
-    steps: int
-    seconds: float
-    motions: tuple[MotionEvaluation, ...] = ()
-
-    def figures(self) -> dict[str, Any]:
-        """Returns everything as JSON-compatible data, ``motions`` only where there are several."""
-        data = asdict(self)
-        return data if self.motions else {k: v for k, v in data.items() if k != "motions"}
-
-    def save(self, run: str | Path) -> Path:
-        """Writes ``evaluation.json`` into a run directory."""
-        path = Path(run) / EVALUATION_FILE
-        path.write_text(json.dumps(self.figures(), indent=2, allow_nan=False) + "\n")
-        return path
 
 
 def evaluation_options(
