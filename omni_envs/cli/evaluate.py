@@ -42,24 +42,30 @@ class Evaluate:
     """Print JSON: one object per file, in a list if there are several files."""
 
     def run(self) -> None:  # noqa: D102
-        from omni_envs.metrics import bars_table, summary_table
+        from omni_envs.metrics import bars_table, missed_contacts, summary_table
         from omni_envs.references import evaluate_reference, open_reference, report_picture
 
         if self.picture is not None and len(self.references) != 1:
             raise InvalidOptionError("--picture: draws one reference; give a single file.")
         demonstration = None if self.source is None else self.read.load(self.source)
-        rows = []
+        rows, misses = [], []
         for path in self.references:
             reference = open_reference(path, self.robot, demonstration)
             report = evaluate_reference(reference)
             if self.picture is not None:
                 report_picture(replace(reference, report=report), self.picture)
             rows.append(report.details() if self.details else report.summary())
+            misses.append(missed_contacts(report))
         if self.json:
             print(json.dumps(rows[0] if len(rows) == 1 else rows, allow_nan=False))
             return
-        columns = dict(zip(_headings(self.references), rows, strict=True))
+        headings = _headings(self.references)
+        columns = dict(zip(headings, rows, strict=True))
         console.print(summary_table(columns) if self.details else bars_table(columns))
+        for heading, missed in zip(headings, misses, strict=True):
+            if missed:
+                told = ", ".join(map(str, missed))
+                console.print(f"{heading} does not reach what the human touches: {told}")
 
 
 def _headings(paths: tuple[Path, ...]) -> list[str]:

@@ -14,7 +14,7 @@ from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.demonstrations.source_resampling import resample_source
 from omni_envs.demonstrations.variation import Variation, vary
 from omni_envs.errors import InvalidDataError
-from omni_envs.metrics import ReferenceReport, evaluate
+from omni_envs.metrics import ReferenceReport, evaluate, missed_contacts
 from omni_envs.metrics.playback import TARGETS, play
 from omni_envs.progress import ProgressCallback
 from omni_envs.references.key import content_hashes, reference_key, versions
@@ -98,6 +98,7 @@ def make_reference(
         motion.source,
         relaxed=motion.frames.relaxed,
     )
+    _warn_of_misses(source, robot, report)
     return reference_from_qpos(
         robot,
         motion.fps,
@@ -135,6 +136,16 @@ def _warn_of_jumps(source: SourceMotion) -> None:
         warnings.warn(
             f"Demonstration {source.name!r} jumps to frame {shown} ({joints}; faster than "
             f"{SPEED:g} m/s): swapped markers or lost frames? The reference goes astray there.",
+            stacklevel=3,
+        )
+
+
+def _warn_of_misses(source: SourceMotion, robot: Robot, report: ReferenceReport) -> None:
+    """A mean gap tells little of a hand that the robot's arm is too short for."""
+    if misses := missed_contacts(report):
+        shown = ", ".join(map(str, misses[:4])) + (", …" if len(misses) > 4 else "")
+        warnings.warn(
+            f"{robot.title} does not reach what the human touches in {source.name!r}: {shown}.",
             stacklevel=3,
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.kinematics import Kinematics, Points
-from omni_envs.retargeting.limits import STANCE, RowLimit, Rows
+from omni_envs.retargeting.limits import FOOTING, STANCE, RowLimit, Rows
 from omni_envs.retargeting.options import StanceOptions
 from omni_envs.retargeting.stance_plan import ANCHORED, LOOSE
 from omni_envs.robots import SIDES, Robot
@@ -177,14 +177,13 @@ class KeptStance(RowLimit):
         """Returns rows for the windows and for the steps of slow tips."""
         t, windows = self._t, self._windows
         slow, low = np.isfinite(windows.steps[t]), np.isfinite(windows.ceiling[t])
-        slack = windows.slack[t] + np.where(self._landing, _LANDING, 0.0)[:, None, None]
-        held = np.isfinite(slack)
+        held = np.isfinite(windows.slack[t])
         if not (held.any() or slow.any() or low.any()):
             return None
         places = configuration.positions(self._points)
         jacobian = configuration.jacobians(self._points, places).transpose(1, 0, 2)
         places, jacobian = places.reshape(2, 2, 3), jacobian.reshape(2, 2, 3, -1)
-        offset = self._offsets(places)[held]
+        offset, slack = self._offsets(places)[held], windows.slack[t][held]
         moved, step = (places[:, TIP] - self._tips)[slow], windows.steps[t][slow]
         # A tip that a repair has lifted may always come back to the height it had: else every
         # repair of the next frames would lift it a little further.
@@ -193,15 +192,27 @@ class KeptStance(RowLimit):
         turned = windows.axes[t][:, None] @ jacobian
         room = (windows.ceiling[t] - places[:, TIP, 2])[low]
         A = np.concatenate([turned[held], jacobian[:, TIP][slow], jacobian[low, TIP, 2]])
-        lower = np.concatenate(
-            [
-                -slack[held] - offset,
-                np.minimum(-step, back[slow]) - moved,
-                np.full(len(room), -np.inf),
-            ]
-        )
-        upper = np.concatenate([slack[held] - offset, step - moved, room])
-        return Rows(A, lower, upper, np.full(len(lower), STANCE))
+        least = np.minimum(-step, back[slow]) - moved
+        lower = np.concatenate([-slack - offset, least, np.full(len(room), -np.inf)])
+        upper = np.concatenate([slack - offset, step - moved, room])
+        kind = np.full(len(lower), STANCE)
+        landing = np.broadcast_to(self._landing[:, None, None], held.shape)[held]
+        if landing.any():
+            # A landing foot aims at its window, and must not miss it by more than a little.
+            kind[: len(landing)][landing] = FOOTING
+            wider = (slack + _LANDING)[landing]
+            A = np.concatenate([A, turned[held][landing]])
+            lower = np.append(lower, -wider - offset[landing])
+            upper = np.append(upper, wider - offset[landing])
+            kind = np.append(kind, np.full(len(wider), STANCE))
+        # A free foot is not bound, but what repairs the frame shall know it: it will land.
+        free = jacobian[~held.any(axis=(1, 2)), TIP].reshape(-1, jacobian.shape[-1])
+        if len(free):
+            A = np.concatenate([A, free])
+            lower = np.append(lower, np.full(len(free), -np.inf))
+            upper = np.append(upper, np.full(len(free), np.inf))
+            kind = np.append(kind, np.full(len(free), FOOTING))
+        return Rows(A, lower, upper, kind)
 
     def _offsets(self, places: np.ndarray) -> np.ndarray:
         """(2, 2, 2) offsets of (2, 2, 3) places from the centres of their windows."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
-from omni_envs.retargeting.limits import CONTACT, SELF, STANCE, BoundLimit, RowLimit, Rows
+from omni_envs.retargeting.limits import CONTACT, FOOTING, SELF, STANCE, BoundLimit, RowLimit, Rows
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.qp import StepQP, step_bounds, step_rows
 from omni_envs.retargeting.softness import softness
@@ -22,8 +22,8 @@ KINDS = (STANCE, SELF, CONTACT)  # as they are numbered
 # Rows that contradict each other by a hair are met by absurd steps otherwise: two windows that want
 # a flat foot 0.1 mm shorter turn it by 2°.
 _REACH, _SHORTEST, _LONGEST = 30.0, 1e-3, 0.1
-# Weight of the way of planted feet: within its window, a foot moved now is in the way of the next
-# frame.
+# Weight of the way of feet: a planted one moved now, be it within its window, is in the way of the
+# next frame; a free one would land elsewhere.
 _PLANTED = 30.0
 _, _GIVES_WAY = softness(np.array(KINDS))
 
@@ -83,7 +83,7 @@ def restore(
         lower, upper = step_bounds(configuration, bounds)
         np.maximum(lower, -reach, out=lower)
         np.maximum(np.minimum(upper, reach), lower, out=upper)
-        feet = rows.A[rows.kind == STANCE]
+        feet = rows.A[(rows.kind == STANCE) | (rows.kind == FOOTING)]
         H = np.diag(metric) + _PLANTED * (feet.T @ feet)
         dq, soft = solver(StepQP(H, zero, lower, upper, rows, metric, np.inf))
         configuration.update(configuration.step(dq))

@@ -148,3 +148,12 @@ def test_jumps_of_the_recording_are_told(demonstration):
     with pytest.warns(UserWarning, match=r"box_carry.* jumps to frame 15, 16 \(pelvis, "):
         made = make_reference(broken, "g1", fps=30.0)
     assert made.report.summary()["velocity_violation_max_rad_s"] == 0
+
+
+def test_what_the_robot_does_not_reach_is_a_warning(demonstration):
+    poses = demonstration.object_poses + [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    touching = {"left_hand": np.ones(demonstration.num_frames, bool)}
+    far = replace(demonstration, object_poses=poses, contacts=touching)
+    told = r"Unitree G1 does not reach .*box_carry.*: left hand by \d+ cm \(frames 0 to \d+\)"
+    with pytest.warns(UserWarning, match=told):
+        make_reference(far, "g1", fps=30.0)

@@ -10,6 +10,7 @@ from omni_envs.retargeting.kept_stance import (
     stance_windows,
 )
 from omni_envs.retargeting.kinematics import Kinematics, Points
+from omni_envs.retargeting.limits import FOOTING, STANCE
 from omni_envs.retargeting.options import StanceOptions
 from omni_envs.retargeting.stance_plan import ANCHORED, FREE, LOOSE
 from omni_envs.robots import G1
@@ -144,16 +145,18 @@ def test_rows_are_the_derivatives_of_the_windows(robot):
         limit.record(kinematics)
     limit.hold(2)
     rows = limit.rows(kinematics)
-    # Tip and heart, rise and height of the anchored; steps of the loose.
-    assert len(rows.lower) == 4 + 2 + 3
+    # Tip and heart, rise and height of the anchored; steps of the loose, and where it goes.
+    assert len(rows.lower) == 4 + 2 + 3 + 3 and (rows.kind == FOOTING).sum() == 3
     dq = 1e-6 * np.random.default_rng(0).normal(size=G1.nv)
     kinematics.update(kinematics.step(dq))
     after = limit.rows(kinematics)
-    np.testing.assert_allclose(rows.upper - after.upper, rows.A @ dq, atol=1e-10)
-    both = np.isfinite(rows.lower)
-    assert (~both).sum() == 1  # a tip may always come down
-    change = (rows.A @ dq)[both]
-    np.testing.assert_allclose((rows.lower - after.lower)[both], change, atol=1e-10)
+    bound = rows.kind == STANCE
+    assert np.isinf(rows.lower[bound]).sum() == 1  # a tip may always come down
+    for before, then in ((rows.upper, after.upper), (rows.lower, after.lower)):
+        finite = np.isfinite(before)
+        assert (finite <= bound).all()
+        change = before[finite] - then[finite]
+        np.testing.assert_allclose(change, (rows.A @ dq)[finite], atol=1e-10)
 
 
 def test_a_landing_beside_the_window_moves_the_stance(robot):
@@ -169,7 +172,10 @@ def test_a_landing_beside_the_window_moves_the_stance(robot):
         limit.hold(t)
         kinematics.update(q)
         rows = limit.rows(kinematics)
-        worst[t] = None if rows is None else np.maximum(rows.lower, -rows.upper).max()
+        misses = None if rows is None else np.maximum(rows.lower, -rows.upper)
+        worst[t] = None if rows is None else misses[rows.kind == STANCE].max()
+        if t == 1:  # aimed at, but no constraint
+            assert misses[rows.kind == FOOTING].max() > 1e-4
         limit.record(kinematics)
     assert worst[0] is None and worst[1] <= 0.0 and worst[2] <= 1e-12
     assert worst[3] > 1e-4  # and from there it may not come back
