@@ -90,7 +90,7 @@ class ClipProgram:
             options.contact_distance,
             options.self_distance if options.self_collision else None,
         )
-        self.mesh = InteractionMesh.of(source, options.surface_points)
+        self.mesh = InteractionMesh.of(source, options.surface_points, options.ground_points)
         self._mesh_weight = options.laplacian_weight
         self._posture_weight = np.zeros(robot.nv)
         for joint, weight in robot.posture_weights.items():

@@ -144,12 +144,12 @@ class InteractionMesh:
         return cls(factor, offset, constant)
 
     @classmethod
-    def of(cls, source: SourceMotion, count: int = 100) -> InteractionMesh:
-        """The mesh of a source motion with ``count`` surface points."""
+    def of(cls, source: SourceMotion, count: int = 100, ground: int = 0) -> InteractionMesh:
+        """The mesh of a source motion: see ``surface_points``."""
         poses = source.object_poses
         return cls.build(
             source.keypoints,
-            surface_points(source, count),
+            surface_points(source, count, ground),
             source.source_object_poses,
             poses if source.mesh_object_poses is None else source.mesh_object_poses,
             source.scale,

@@ -57,6 +57,8 @@ class RetargetOptions:
 
     Attributes:
         surface_points: Points on object or terrain in the interaction mesh (OmniRetarget: 100).
+        ground_points: Most points of the ground beside terrain that are in the mesh, too
+            (OmniRetarget's climbs: none).
         laplacian_weight: Weight of the deformation energy (OmniRetarget: 10).
         smoothness_weight: Weight of the distance to the previous frame (OmniRetarget: 0.2).
         contact_weight: Weight of the distance between a touching link and the point of the surface
@@ -90,6 +92,7 @@ class RetargetOptions:
     """
 
     surface_points: int = 100
+    ground_points: int = 0
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
     contact_weight: float = 400.0
@@ -114,6 +117,7 @@ class RetargetOptions:
 
     def __post_init__(self) -> None:
         _require(self.surface_points >= 8, "surface_points", "at least 8", self.surface_points)
+        _require(self.ground_points >= 0, "ground_points", "at least 0", self.ground_points)
         for f in fields(self):
             value = getattr(self, f.name)
             if f.name.endswith("_weight") or f.name.endswith("tolerance"):

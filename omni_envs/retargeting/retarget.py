@@ -93,7 +93,7 @@ def retarget(
     if nominal is not None:
         given = nominal.qpos if isinstance(nominal, Retargeted) else nominal
         nominal = check_nominal(robot, given, source.num_frames)
-    mesh = InteractionMesh.of(source, options.surface_points)
+    mesh = InteractionMesh.of(source, options.surface_points, options.ground_points)
     return _Retargeter(source, robot, options, mesh, nominal).run(progress)
 
 
@@ -123,7 +123,7 @@ def deformation_energy(
             f"Motion of {robot.name!r}", "qpos", f"of shape {expected}", str(np.shape(qpos))
         )
     options = options or RetargetOptions()
-    mesh = InteractionMesh.of(source, options.surface_points)
+    mesh = InteractionMesh.of(source, options.surface_points, options.ground_points)
     return mesh.energy(keypoint_positions(robot, source, qpos))
 
 

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import trimesh
+from scipy.spatial import cKDTree
 
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.demonstrations.surface import closest_points
 from omni_envs.retargeting import kernels
+from omni_envs.scenes import Terrain
 
 # Upward faces carry feet, hands and knees: they get this many times the points per area of others.
 _TOP_WEIGHT = 4.0
 # Without object and terrain: 9 × 9 jittered ground points, 0.28 m apart at human scale, around the
 # body.
 _GROUND_CELLS, _GROUND_SPACING = 9, 0.28
+_CLEAR = 0.02  # m: ground points keep this far from terrain
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +35,15 @@ class SurfacePoints:
     target: np.ndarray
 
 
-def surface_points(source: SourceMotion, count: int) -> SurfacePoints:
-    """Chooses the surface points of a source: on object, else terrain, else ground.
+def surface_points(source: SourceMotion, count: int, ground: int = 0) -> SurfacePoints:
+    """Chooses the surface points of a source: on object, else terrain and ground, else ground.
 
     Deterministic. Object points keep their place when the object shrinks by the source's scale.
 
     Args:
         source: The motion.
         count: Number of points on object or terrain.
+        ground: Most points on the ground beside terrain.
     """
     target = source.scene
     original = source.original_scene or target
@@ -48,7 +53,18 @@ def surface_points(source: SourceMotion, count: int) -> SurfacePoints:
         return SurfacePoints(points * source.scale, at.on(target.object.surface()))
     if original.terrain is not None and target.terrain is not None:
         at = _spread(original.terrain.surface(), count, top_weight=_TOP_WEIGHT)
-        return SurfacePoints(at.on(original.terrain.surface()), at.on(target.terrain.surface()))
+        before, after = original.terrain.surface(), target.terrain.surface()
+        terrain = SurfacePoints(at.on(before), at.on(after))
+        if not ground:
+            return terrain
+        beside = _ground_beside(source, original.terrain, ground)
+        # Ground goes with the nearest corner of the terrain, where a variation has moved that.
+        _, corner = cKDTree(before.vertices[:, :2]).query(beside[:, :2])
+        shift = (np.asarray(after.vertices) - before.vertices)[corner] * (1.0, 1.0, 0.0)
+        return SurfacePoints(
+            np.concatenate([terrain.source, beside]),
+            np.concatenate([terrain.target, beside + shift]),
+        )
     points = _ground(source.keypoints[:, 0, :2], _GROUND_SPACING * source.scale)
     return SurfacePoints(points, points)
 
@@ -77,6 +93,20 @@ def _spread(surface: trimesh.Trimesh, count: int, top_weight: float) -> _Places:
     stretch = np.where(normals[face, 2] > 0.7, np.sqrt(top_weight), 1.0)
     chosen = kernels.farthest_points(candidates, stretch, count)
     return _Places(face[chosen], weights[chosen])
+
+
+def _ground_beside(source: SourceMotion, terrain: Terrain, count: int) -> np.ndarray:
+    """(N, 3) points of the jittered grid near the way of the body and not under terrain."""
+    grid = _ground(source.keypoints[:, 0, :2], _GROUND_SPACING * source.scale)
+    candidates = np.unique(grid.reshape(-1, 3), axis=0)
+    _, distance = closest_points(terrain.parts, candidates)
+    free = distance > _CLEAR
+    if terrain.heightfield is not None:
+        free &= terrain.heightfield.height_at(candidates[:, :2]) < _CLEAR
+    candidates = candidates[free]
+    if len(candidates) <= count:
+        return candidates
+    return candidates[kernels.farthest_points(candidates, np.ones(len(candidates)), count)]
 
 
 def _ground(centres: np.ndarray, spacing: float) -> np.ndarray:

@@ -151,7 +151,7 @@ def test_jumps_of_the_recording_are_told(demonstration):
 
 
 def test_what_the_robot_does_not_reach_is_a_warning(demonstration):
-    poses = demonstration.object_poses + [2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    poses = demonstration.object_poses + np.eye(7)[0] * 2.0  # 2 m ahead
     touching = {"left_hand": np.ones(demonstration.num_frames, bool)}
     far = replace(demonstration, object_poses=poses, contacts=touching)
     told = r"Unitree G1 does not reach .*box_carry.*: left hand by \d+ cm \(frames 0 to \d+\)"
