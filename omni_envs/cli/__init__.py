@@ -57,6 +57,10 @@ def main(arguments: list[str] | None = None) -> int:
     except OmniEnvsError as error:
         print(f"omni-envs: {error}", file=sys.stderr)
         return 1
+    except OSError as error:  # a folder that cannot be written, a full disk
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"omni-envs: {place}{error.strerror or error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("omni-envs: interrupted", file=sys.stderr)
         return 1

@@ -64,6 +64,8 @@ class Retarget:
         names = [d.name for d in demonstrations]
         if len(set(names)) < len(names):
             raise InvalidOptionError(f"--out: sources of equal name would overwrite: {names}.")
+        folder = self.out if several else self.out.parent
+        folder.mkdir(parents=True, exist_ok=True)  # where it cannot be, before the work
         with progress_bar("Retargeting", disable=self.json) as progress:
             common: dict[str, Any] = {"fps": self.fps, "options": options, "progress": progress}
             if several:
@@ -76,7 +78,6 @@ class Retarget:
                 failed.append(f"{demonstration.name}: {reference}")
                 continue
             path = self.out / f"{demonstration.name}.npz" if several else self.out
-            path.parent.mkdir(parents=True, exist_ok=True)
             reference.save(path)
             assert reference.report is not None  # make_reference always evaluates
             rows.append({**reference.report.summary(), **_speed(reference)})

@@ -13,7 +13,7 @@ from omni_envs.errors import InvalidOptionError, OmniEnvsError
 from omni_envs.generation.card import write_card
 from omni_envs.generation.engines import ENGINES
 from omni_envs.generation.item import DONE, Item
-from omni_envs.generation.manifest import Manifest
+from omni_envs.generation.manifest import Manifest, sole_writer
 from omni_envs.generation.recipe import Recipe, SourceEntry
 from omni_envs.progress import ProgressCallback
 from omni_envs.references import reference_key
@@ -50,7 +50,8 @@ def generate(
 
     Raises:
         InvalidOptionError: An option that is not allowed.
-        OmniEnvsError: Two sources of one name, or a worker died.
+        OmniEnvsError: Two sources of one name, another process that makes the same part, or a
+            worker that died.
     """
     out = Path(out)
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
@@ -61,34 +62,35 @@ def generate(
     number, count = shard
     if not 1 <= number <= count:
         raise InvalidOptionError(f"shard: expected i/n with 1 ≤ i ≤ n; got {number}/{count}.")
-    manifest = Manifest(out, shard)
-    items, broken = plan(recipe)
-    mine = items[number - 1 :: count]
-    todo = [item for item in mine if not manifest.is_done(item)]
-    if number == 1:
-        for row in broken:
-            manifest.add(row)
-    total, done = sum(item.frames for item in todo), 0
-    if todo:
-        # Unvaried first, as the others are anchored to them; then the long ones.
-        order = sorted(todo, key=lambda i: (not i.name.endswith("/nominal"), -i.frames))
-        for row in ENGINES[engine](order, str(out), jobs):
-            manifest.add(row)
-            done += int(row["frames"])
-            if progress is not None:
-                progress(done, total)
-    if todo or not (out / "README.md").is_file():
-        write_card(out, manifest.rows.values(), previews=previews)
-    failed = [r["name"] for r in _of(manifest, mine) if r["status"] != DONE]
-    failed += [row["name"] for row in broken]
-    return {
-        "items": len(mine) + len(broken),
-        "made": len(todo),
-        "kept": len(mine) - len(todo),
-        "failed": len(failed),
-        "frames": total,
-        "failed_names": failed,
-    }
+    with sole_writer(out, shard):
+        manifest = Manifest(out, shard)
+        items, broken = plan(recipe)
+        mine = items[number - 1 :: count]
+        todo = [item for item in mine if not manifest.is_done(item)]
+        if number == 1:
+            for row in broken:
+                manifest.add(row)
+        total, done = sum(item.frames for item in todo), 0
+        if todo:
+            # Unvaried first, as the others are anchored to them; then the long ones.
+            order = sorted(todo, key=lambda i: (not i.name.endswith("/nominal"), -i.frames))
+            for row in ENGINES[engine](order, str(out), jobs):
+                manifest.add(row)
+                done += int(row["frames"])
+                if progress is not None:
+                    progress(done, total)
+        if todo or not (out / "README.md").is_file():
+            write_card(out, manifest.rows.values(), previews=previews)
+        failed = [r["name"] for r in _of(manifest, mine) if r["status"] != DONE]
+        failed += [row["name"] for row in broken]
+        return {
+            "items": len(mine) + len(broken),
+            "made": len(todo),
+            "kept": len(mine) - len(todo),
+            "failed": len(failed),
+            "frames": total,
+            "failed_names": failed,
+        }
 
 
 def plan(recipe: Recipe) -> tuple[list[Item], list[dict[str, Any]]]:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock, Timeout
+
+from omni_envs.errors import OmniEnvsError
 from omni_envs.generation.item import DONE, Item, file_hash
 
 PATTERN = "manifest*.jsonl"
@@ -49,6 +53,32 @@ class Manifest:
             file.flush()
             os.fsync(file.fileno())
         self.rows[row["name"]] = row
+
+
+@contextmanager
+def sole_writer(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
+    """Keeps a second process from making the same part of a dataset at the same time.
+
+    The lock goes with the process, even if it is killed.
+
+    Raises:
+        OmniEnvsError: Another process makes this part.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / ".{}-of-{}.lock".format(*shard)
+    lock = FileLock(path)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise OmniEnvsError(
+            f"Another process makes part {shard[0]}/{shard[1]} of {folder}. To share the work, "
+            "give every process a part of its own: --shard 1/2 and --shard 2/2."
+        ) from error
+    try:
+        yield
+    finally:
+        path.unlink(missing_ok=True)
+        lock.release()
 
 
 def _lines(path: Path) -> Iterable[dict[str, Any]]:

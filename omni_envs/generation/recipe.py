@@ -159,12 +159,21 @@ def _variations(path: Path, place: str, source: Mapping[str, Any]) -> tuple[Vari
             sample = source["sample"]
             names = ("count", "ranges", "seed")
             _check_fields(path, f"{place}.sample", sample, names, names[:2])
+            count = sample["count"]
+            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+                raise FileFormatError(
+                    path, f"{place}.sample.count", "a whole number from 1 on", repr(count)
+                )
             rng = np.random.default_rng(sample.get("seed", 0))
             found += sample_variations(sample["count"], rng, **sample["ranges"])
     except FileFormatError:
         raise
-    except (OmniEnvsError, TypeError, ValueError) as error:
+    except OmniEnvsError as error:
         raise FileFormatError(path, place, "variations", str(error)) from error
+    except (TypeError, ValueError) as error:  # words where numbers belong, one where there are two
+        said = {key: source[key] for key in ("variations", "grid", "sample") if key in source}
+        expected = "variations in numbers (see omni_envs.demonstrations.Variation)"
+        raise FileFormatError(path, place, expected, repr(said)[:120]) from error
     return tuple(dict.fromkeys(found))
 
 

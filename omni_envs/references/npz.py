@@ -68,6 +68,9 @@ def complete_file(path: str | Path) -> Iterator[Path]:
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        error.filename = error.filename or str(path)  # a full disk does not tell
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

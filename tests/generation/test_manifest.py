@@ -1,8 +1,13 @@
+import subprocess
+import sys
+
 import pytest
 
 from omni_envs.demonstrations import Variation
+from omni_envs.errors import OmniEnvsError
 from omni_envs.generation import Item, Manifest
 from omni_envs.generation.item import file_hash
+from omni_envs.generation.manifest import sole_writer
 
 ITEM = Item("a/g1/nominal", "a", "{}", "g1", Variation(), 50.0, True, 10, "key")
 
@@ -52,3 +57,33 @@ def test_shards_write_apart_and_read_together(tmp_path, row):
         Manifest(tmp_path, (number, 2)).add(row | {"name": str(number)})
     assert len(list(tmp_path.glob("manifest-*.jsonl"))) == 2
     assert set(Manifest(tmp_path).rows) == {"1", "2"}
+
+
+def test_one_writer_per_part(tmp_path):
+    with sole_writer(tmp_path / "new", (1, 1)):
+        with (
+            pytest.raises(OmniEnvsError, match=r"Another process.*--shard 1/2"),
+            sole_writer(tmp_path / "new", (1, 1)),
+        ):
+            pass
+        with sole_writer(tmp_path / "new", (2, 3)):  # another part
+            pass
+    with sole_writer(tmp_path / "new", (1, 1)):  # the first one is done
+        pass
+    assert not list((tmp_path / "new").iterdir())
+
+
+def test_the_lock_of_a_killed_writer_does_not_stay(tmp_path):
+    code = (
+        "import sys, time\nfrom pathlib import Path\n"
+        "from omni_envs.generation.manifest import sole_writer\n"
+        "with sole_writer(Path(sys.argv[1]), (1, 1)):\n    print(flush=True); time.sleep(60)"
+    )
+    writer = subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE)
+    assert writer.stdout is not None and writer.stdout.readline()
+    with pytest.raises(OmniEnvsError, match="Another process"), sole_writer(tmp_path, (1, 1)):
+        pass
+    writer.kill()
+    writer.wait()
+    with sole_writer(tmp_path, (1, 1)):
+        pass

@@ -88,7 +88,7 @@ def test_bad_recipes_are_refused(tmp_path, change, message):
         ({"grid": {"yaw": [1]}}, "no field of a variation"),
         ({"grid": {"object_yaw": 1}}, "variations"),
         ({"sample": {"count": 3}}, "sample.ranges"),
-        ({"sample": {"count": "many", "ranges": {}}}, "variations"),
+        ({"sample": {"count": "many", "ranges": {}}}, "sample.count: .*a whole number"),
         ({"sample": {"count": 1, "ranges": {"object_yaw": [1]}}}, "lowest, highest"),
     ],
 )
@@ -96,6 +96,24 @@ def test_bad_sources_are_refused(tmp_path, change, message):
     source = MINIMAL["sources"][0] | change
     with pytest.raises(FileFormatError, match=rf"sources\[0\].*{message}"):
         read_recipe(write(tmp_path, MINIMAL | {"sources": [source]}))
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.5, True, "3"])
+def test_a_sample_counts(tmp_path, count):
+    sample = {"count": count, "ranges": {"object_yaw": [0, 1]}}
+    path = tmp_path / "recipe.yaml"
+    source = {"demonstration": "box_carry", "sample": sample}
+    path.write_text(yaml.safe_dump(MINIMAL | {"sources": [source]}))
+    with pytest.raises(FileFormatError, match=r"sources\[0\]\.sample\.count: .*from 1 on"):
+        read_recipe(path)
+
+
+def test_words_instead_of_numbers_are_shown(tmp_path):
+    path = tmp_path / "recipe.yaml"
+    source = {"demonstration": "box_carry", "variations": [{"object_yaw": "left"}]}
+    path.write_text(yaml.safe_dump(MINIMAL | {"sources": [source]}))
+    with pytest.raises(FileFormatError, match=r"sources\[0\]: .*in numbers.*'object_yaw': 'left'"):
+        read_recipe(path)
 
 
 def test_missing_recipe(tmp_path):
