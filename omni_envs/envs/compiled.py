@@ -166,7 +166,7 @@ class CompiledTask:
             simulation: The states, to write to.
             episodes: Where the episodes are, started already.
             ids: (K,) simulations.
-            draws: (K, ``self.draws``) uniform in [0, 1), of the disturbance.
+            draws: (``self.draws``, K) uniform in [0, 1), of the disturbance.
             share: (K,) share of the disturbance that each gets, all of it by default.
             rng: Source of the observation's noise.
             out: Observations of N simulations, to write to.

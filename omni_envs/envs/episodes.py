@@ -164,7 +164,7 @@ class Episodes:
             ids: (K,) simulations.
             motion: (K,) motions.
             frame: (K,) frames that the simulations are put in.
-            draws: (K, ``self.draws``) uniform in [0, 1).
+            draws: (``self.draws``, K) uniform in [0, 1).
         """
         kernels.start_clocks(
             self.table,

@@ -420,15 +420,15 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             return
         rng, task, episodes = self.np_random, self._task, self._episodes
         # All chance of a start in one draw: frame, model, share of the noise, clocks, state.
-        draws = rng.random((len(ids), 4 + episodes.draws + task.draws))
-        motions, places = self.sampler.draw(draws[:, :2])
+        draws = rng.random((4 + episodes.draws + task.draws, len(ids)))
+        motions, places = self.sampler.draw(draws[:2])
         if frame is not None or motion is not None:
             motions, places = self._library.places(motion, frame, len(ids))
         simulation, rest = self.simulation, 4 + episodes.draws
-        simulation.reset(ids, self._variants.choose(self._scene_of, motions, draws[:, 2]))
-        episodes.start(ids, motions, places, draws[:, 4:rest])
-        share = self._noise.shares(draws[:, 3])
-        task.begin(simulation, episodes, ids, draws[:, rest:], share, rng, self.observations)
+        simulation.reset(ids, self._variants.choose(self._scene_of, motions, draws[2]))
+        episodes.start(ids, motions, places, draws[4:rest])
+        share = self._noise.shares(draws[3])
+        task.begin(simulation, episodes, ids, draws[rest:], share, rng, self.observations)
 
     def _push(self, done: np.ndarray) -> None:
         due, config = self._episodes.due_pushes(self.np_random), self.config.randomization.push

@@ -755,15 +755,15 @@ def draw_frames(
     cumulative: Array, motions: Array, low: Array, width: Array, last: Array, draws: Array,
     out_motion: Array, out_frame: Array,
 ) -> None:  # fmt: skip
-    """Draws (K,) motions and start frames, given (K, 2) uniform draws in [0, 1).
+    """Draws (K,) motions and start frames, given (2, K) uniform draws in [0, 1).
 
     A draw chooses one of (C,) stretches of motion, whose ``cumulative`` shares are given, then a
     frame of its ``width`` from ``low`` on, at most the ``last`` of the motion, (M,).
     """
-    for k in range(len(draws)):
-        c = min(np.searchsorted(cumulative, draws[k, 0], side="right"), len(cumulative) - 1)
+    for k in range(draws.shape[1]):
+        c = min(np.searchsorted(cumulative, draws[0, k], side="right"), len(cumulative) - 1)
         out_motion[k] = motions[c]
-        out_frame[k] = min(int(low[c] + draws[k, 1] * width[c]), last[motions[c]])
+        out_frame[k] = min(int(low[c] + draws[1, k] * width[c]), last[motions[c]])
 
 
 @_compiled
@@ -776,7 +776,7 @@ def start_clocks(
 
     ``starts`` and ``lengths`` are (M,) first rows and frames of the motions, ``most`` the control
     steps until the time-out, ``pushes`` the fewest and most control steps until a push, or empty,
-    ``draws`` (K, 1 + n) uniform in [0, 1): of the push, and of the default joint positions
+    ``draws`` (1 + n, K) uniform in [0, 1): of the push, and of the default joint positions
     (rad), which lie ± ``half`` about the ``nominal`` ones.
     """
     now = _clocks(clocks)
@@ -787,9 +787,9 @@ def start_clocks(
         now.elapsed[i], now.frame[i] = 0, frame + 1
         now.rows[i] = starts[motion] + frame + 1
         now.possible[i] = min(now.last[i] - frame, most)
-        now.next_push[i] = next_push(pushes, draws[k, 0])
+        now.next_push[i] = next_push(pushes, draws[0, k])
         for j in range(len(nominal)):
-            out_default[i, j] = nominal[j] + (2.0 * draws[k, 1 + j] - 1.0) * half
+            out_default[i, j] = nominal[j] + (2.0 * draws[1 + j, k] - 1.0) * half
             out_action[i, j] = 0.0
 
 
@@ -808,7 +808,7 @@ def start_states(
 ) -> None:  # fmt: skip
     """Puts the simulations ``ids`` a row before their (N,) rows, disturbed: see ``start_state``.
 
-    ``draws`` is (K, 15 + n), uniform in [0, 1), and ``widths`` (K, 15 + n) or (1, 15 + n), half
+    ``draws`` is (15 + n, K), uniform in [0, 1), and ``widths`` (K, 15 + n) or (1, 15 + n), half
     widths of root position, orientation, linear and angular velocity, object position and joints;
     or both are empty.
     """
@@ -829,7 +829,7 @@ def start_states(
             continue
         wide = min(k, len(widths) - 1)
         for c in range(15 + n):
-            d[c] = (2.0 * draws[k, c] - 1.0) * widths[wide, c]
+            d[c] = (2.0 * draws[c, k] - 1.0) * widths[wide, c]
         roll, pitch, yaw = 0.5 * d[3], 0.5 * d[4], 0.5 * d[5]
         about_z, about_y = (cos(yaw), 0.0, 0.0, sin(yaw)), (cos(pitch), 0.0, sin(pitch), 0.0)
         turn = _product(_product(about_z, about_y), (cos(roll), sin(roll), 0.0, 0.0))

@@ -110,7 +110,7 @@ class MotionSampler:
         """Draws start frames.
 
         Args:
-            draws: (K, 2) uniform in [0, 1).
+            draws: (2, K) uniform in [0, 1).
 
         Returns:
             (K,) motions and (K,) frames within them, at most the last but one.
@@ -121,7 +121,7 @@ class MotionSampler:
                 motions = len(self._last_start)
                 shares = np.append((1.0 - first) * shares, np.full(motions, first / motions))
             self._cumulative = np.cumsum(shares)
-        motion, frame = np.empty((2, len(draws)), int)
+        motion, frame = np.empty(draws.shape, int)
         kernels.draw_frames(self._cumulative, *self._cells, self._last_start, draws, motion, frame)
         return motion, frame
 

@@ -207,7 +207,7 @@ def test_start_states_agree(case, share):
     simulation = SimpleNamespace(qpos=qpos, qvel=qvel, bodies=lambda: s.bodies)
     config = plain.config
     episodes = Episodes(s.library, G1.default_joint_array, 40, config, None)
-    draws = np.random.default_rng(4).random((3, compiled.draws))
+    draws = np.random.default_rng(4).random((3, compiled.draws)).T.copy()
     critic = plain.critic_layout.size if config.observation.privileged else None
     out = empty_observations(40, plain.policy_layout.size, critic)
     episodes.rows[:] = s.rows + 1

@@ -17,7 +17,7 @@ def start(library, num=3000, max_steps=500, **options):
     config = make_config(**options)
     episodes = Episodes(library, G1.default_joint_array, num, config, max_steps)
     rng = np.random.default_rng(0)
-    draws = rng.random((num, episodes.draws))
+    draws = rng.random((episodes.draws, num))
     episodes.start(np.arange(num), np.zeros(num, int), np.full(num, 10), draws)
     return episodes, rng
 
@@ -35,7 +35,7 @@ def test_the_frame_after_the_start_is_tracked_first(library):
     episodes, _ = start(library, 2)
     assert episodes.frame.tolist() == [11, 11]
     assert episodes.rows.tolist() == [11, 11]
-    draws = np.random.default_rng(0).random((1, episodes.draws))
+    draws = np.random.default_rng(0).random((episodes.draws, 1))
     episodes.start(np.array([1]), np.array([1]), np.array([4]), draws)
     assert episodes.rows.tolist() == [11, 125]
 
@@ -63,7 +63,7 @@ def test_joint_default_is_offset_per_episode(library):
     assert np.abs(offset).max() <= 0.01
     np.testing.assert_allclose(np.quantile(offset, [0.1, 0.9]), [-0.008, 0.008], atol=3e-4)
     kept = episodes.default[1:].copy()
-    draws = rng.random((1, episodes.draws))
+    draws = rng.random((episodes.draws, 1))
     episodes.start(np.array([0]), np.array([0]), np.array([0]), draws)
     assert (episodes.default[0] != G1.default_joint_array + offset[0]).all()
     np.testing.assert_array_equal(episodes.default[1:], kept)

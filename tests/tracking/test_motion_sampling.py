@@ -19,7 +19,7 @@ def make(sway, start, frames=(120, 60), **adaptive):
 
 def test_uniform_draws_every_start_frame_equally(sway, rng):
     sampler = make(sway, "uniform")
-    motion, frame = sampler.draw(rng.random((60_000, 2)))
+    motion, frame = sampler.draw(rng.random((2, 60_000)))
     place = frame + np.where(motion == 1, 119, 0)
     counts = np.bincount(place, minlength=119 + 59)
     assert len(counts) == 178  # the last frame of a motion leaves nothing to track
@@ -28,7 +28,7 @@ def test_uniform_draws_every_start_frame_equally(sway, rng):
 
 
 def test_start_draws_the_first_frames(sway, rng):
-    motion, frame = make(sway, "start").draw(rng.random((1000, 2)))
+    motion, frame = make(sway, "start").draw(rng.random((2, 1000)))
     assert not frame.any()
     assert 400 < motion.sum() < 600
 
@@ -37,7 +37,7 @@ def test_start_draws_the_first_frames(sway, rng):
 def test_a_share_starts_at_the_first_frames_of_all_motions(sway, rng, start):
     library = MotionLibrary(G1, [sway(120), sway(60)], 50.0)
     sampler = MotionSampler(library, ResetConfig(start=start, start_share=0.3))
-    motion, frame = sampler.draw(rng.random((20_000, 2)))
+    motion, frame = sampler.draw(rng.random((2, 20_000)))
     first = frame == 0
     # Some more where uniform draws over 178 frames, or over two first bins of fifths, hit them.
     assert np.isclose(first.mean(), 1.0 if start == "start" else 0.3, atol=0.025)
@@ -53,7 +53,7 @@ def test_bins_are_about_a_second(sway):
 def test_adaptive_starts_uniform_over_bins(sway, rng):
     sampler = make(sway, "adaptive", frames=(120,))
     np.testing.assert_allclose(sampler.probabilities(), 1 / 3)
-    _, frame = sampler.draw(rng.random((30_000, 2)))
+    _, frame = sampler.draw(rng.random((2, 30_000)))
     assert frame.max() <= 118
     counts = np.bincount((frame * 3 / 119).astype(int), minlength=3)
     assert np.abs(counts - 10_000).max() < 500
@@ -91,7 +91,7 @@ def test_failing_bins_are_drawn_more_often(sway, rng):
     sampler = make(sway, "adaptive", frames=(120, 60))
     for _ in range(200):
         sampler.record(np.array([1]), np.array([50]))
-    motion, frame = sampler.draw(rng.random((2000, 2)))
+    motion, frame = sampler.draw(rng.random((2, 2000)))
     assert np.mean((motion == 1) & (frame >= 29)) > 0.6
     assert sampler.metrics()["entropy"] < 0.9
     assert sampler.metrics()["top_bin"] == 4
