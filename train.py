@@ -15,7 +15,7 @@ from rich.table import Table
 
 from omni_envs.errors import InvalidOptionError, MissingDependencyError, OmniEnvsError
 from omni_envs.progress import progress_bar
-from omni_envs.training.config import TrainConfig
+from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.recipes import RECIPES
 
 PACKAGES = {"sb3": ("stable_baselines3", "SB3"), "torchrl": ("torchrl", "TorchRL")}
@@ -55,7 +55,8 @@ class Arguments:
     device of the run to resume. Physics is on the CPU."""
 
     resume: bool = False
-    """Go on from the last checkpoint in the run directory, with the settings saved there."""
+    """Go on from the last checkpoint in the run directory, with the settings saved there, but for
+    what --ppo, --training-options, --num-envs, --num-threads and --device change."""
 
     time_limit: float = 0.0
     """Seconds of training, earlier parts included, after which it ends anyway; 0 = no limit."""
@@ -91,7 +92,7 @@ def make_config(arguments: Arguments) -> TrainConfig:
             raise InvalidOptionError(
                 f"{arguments.out} is a run on {config.env}: --env must say so."
             )
-        return replace(config, **ends)
+        return _going_on(arguments, replace(config, **ends))
     return RECIPES[arguments.recipe].config(
         arguments.env,
         arguments.out,
@@ -103,6 +104,23 @@ def make_config(arguments: Arguments) -> TrainConfig:
         num_threads=arguments.num_threads,
         seed=arguments.seed,
         **ends,
+    )
+
+
+def _going_on(arguments: Arguments, config: TrainConfig) -> TrainConfig:
+    """Lays the options that were given over the settings that a run was saved with."""
+    if arguments.env_options != "{}":
+        raise InvalidOptionError("--env-options: the task of a run that goes on cannot change.")
+    data = config.to_dict()
+    options = _mapping("--training-options", arguments.training_options)
+    return TrainConfig.from_dict(
+        {
+            **data,
+            "num_envs": arguments.num_envs or config.num_envs,
+            "num_threads": arguments.num_threads or config.num_threads,
+            "training_options": merged(config.training_options, options),
+            "ppo": data["ppo"] | _mapping("--ppo", arguments.ppo),
+        }
     )
 
 

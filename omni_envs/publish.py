@@ -151,6 +151,8 @@ def _time(seconds: float) -> str:
 def _write_card(
     out: Path, config: TrainConfig, state: Checkpoint, evaluation: Evaluation, episode: str
 ) -> None:
+    from omni_envs.training.stretches import commands, machines
+
     low, high = evaluation.success_ci95
     possible = evaluation.episode_length_possible
     rows = [
@@ -171,8 +173,9 @@ def _write_card(
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
     million = f"{state.steps / 1e6:.{1 if state.steps >= 1e6 else 3}f} million"
     trained = f"{million} control steps in {_time(state.seconds)}"
-    if state.machines:
-        trained += f" on {', then '.join(state.machines)}"
+    if state.stretches:
+        trained += f" on {', then '.join(machines(state.stretches))}"
+    steps = "\n".join(f"$ {line}" for line in commands(config, state.stretches))
     trainer = {"sb3": "Stable-Baselines3", "torchrl": "TorchRL"}[config.trainer]
     curve = "\n![Learning curve](curve.png)\n" if (out / "curve.png").is_file() else ""
     card = f"""# {out.name}
@@ -202,7 +205,7 @@ take it.
 ## Trained with
 
 ```console
-$ {config.command()}
+{steps}
 ```
 
 ## Licence

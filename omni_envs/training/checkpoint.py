@@ -36,7 +36,8 @@ class Checkpoint:
         policy: Weights and observation statistics.
         optimizer: State of the optimiser.
         rng: State of torch's random generator.
-        machines: What the run was trained on, in words, newest last; see ``device.machine``.
+        stretches: Where and with which settings the run was trained, and from which step on; see
+            ``omni_envs.training.stretches``.
         environment: What episodes have taught the environment; see ``environment.learning_state``.
             None in a file of format 1, and where the environment does not learn.
         device_rng: State of the GPU's random generator, or None for training on the CPU.
@@ -54,7 +55,7 @@ class Checkpoint:
     rng: Tensor
     history: list[dict[str, float]] = field(default_factory=list)
     episodes: list[tuple[float, float]] = field(default_factory=list)
-    machines: list[str] = field(default_factory=list)
+    stretches: list[dict[str, Any]] = field(default_factory=list)
     environment: dict[str, Any] | None = None
     device_rng: Tensor | None = None
 

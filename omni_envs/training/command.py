@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Mapping
 from typing import Any
 
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.recipes import RECIPES
 
+_GOING_ON = ("num_envs", "num_threads", "device")
 _OF_A_RECIPE = ("num_envs", "env_options", "training_options", "ppo")
 
 
@@ -30,6 +32,35 @@ def command(config: TrainConfig) -> str:
         flags[name.replace("_", "-")] = text
     words = [word for flag, value in flags.items() for word in (f"--{flag}", str(value))]
     return shlex.join(["python", "train.py", "--recipe", recipe, *words])
+
+
+def command_to_go_on(before: TrainConfig, now: TrainConfig) -> str:
+    """Returns the command that has a run go on with other settings: what differs."""
+    old, new = before.to_dict(), now.to_dict()
+    flags = {name.replace("_", "-"): new[name] for name in _GOING_ON if new[name] != old[name]}
+    options = overlay(old["training_options"], new["training_options"])
+    ppo = overlay(old["ppo"], new["ppo"])
+    for name, changes in (("training-options", options), ("ppo", ppo)):
+        if changes:
+            flags[name] = json.dumps(changes)
+    ends = {"env": now.env, "steps": now.steps, "episodes": now.evaluation_episodes, "out": now.out}
+    words = [word for flag, v in (flags | ends).items() for word in (f"--{flag}", str(v))]
+    return shlex.join(["python", "train.py", "--resume", *words])
+
+
+def overlay(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns what, laid over ``old`` by ``merged``, gives ``new``: what is gone becomes None."""
+    changes: dict[str, Any] = {name: None for name in old if name not in new}
+    for name, value in new.items():
+        was = old.get(name)
+        if isinstance(value, Mapping) and isinstance(was, Mapping):
+            inner = {key: None for key in was if key not in value}
+            inner |= {key: v for key, v in value.items() if key not in was or was[key] != v}
+            if inner:
+                changes[name] = inner
+        elif name not in old or was != value:
+            changes[name] = value
+    return changes
 
 
 def _recipe(config: TrainConfig) -> tuple[str, dict[str, Any]]:

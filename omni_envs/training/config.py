@@ -43,7 +43,8 @@ class PPOConfig:
         entropy_weight: Weight of the entropy bonus.
         max_grad_norm: Largest norm of the gradient.
         hidden: Widths of the hidden layers, of actor and critic alike.
-        initial_std: Standard deviation of the exploration noise at the start, in units of action.
+        initial_std: Standard deviation of the exploration noise at the start, in units of action; a
+            run that goes on with another one starts again from that.
     """
 
     rollout_steps: int = 24
@@ -174,11 +175,15 @@ class TrainConfig:
         except TypeError as error:
             raise InvalidOptionError(f"TrainConfig: {error}.") from error
 
-    def command(self) -> str:
-        """Returns the command that repeats this run: a recipe, and what differs from it."""
-        from omni_envs.training.command import command
+    def command(self, before: TrainConfig | None = None) -> str:
+        """Returns the command that repeats this run: a recipe, and what differs from it.
 
-        return command(self)
+        Args:
+            before: Settings of the run up to here, which this one goes on with.
+        """
+        from omni_envs.training.command import command, command_to_go_on
+
+        return command(self) if before is None else command_to_go_on(before, self)
 
     def save(self, run: Path | None = None) -> Path:
         """Writes ``config.json`` into a run directory, by default its own."""

@@ -23,6 +23,7 @@ from omni_envs.training.device import machine, torch_device
 from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.environment import make_env
 from omni_envs.training.learner import History, Learner, autoreset_mode, make_learner
+from omni_envs.training.stretches import Stretch, check_changes, lengthened, set_exploration
 
 KEEP_CHECKPOINTS = 3
 
@@ -108,6 +109,9 @@ def _train(
         raise InvalidOptionError(
             f"{config.out} holds a published policy, without what a training needs to go on."
         )
+    if start:
+        check_changes(TrainConfig.load(config.out), config)
+        set_exploration(state, config)
     config.save()
     if start:
         learner.restore(state)
@@ -115,7 +119,7 @@ def _train(
         state.save(config.out)
     history, before, begin = state.history, state.seconds, time.perf_counter()
     here = machine(torch_device(config.device), config.num_threads)
-    machines = [*(name for name in state.machines if name != here), here]
+    stretches = lengthened(state.stretches, config, learner.steps, here)
     seconds, saved = before, learner.steps
     show = sys.stderr.isatty() if progress is None else progress
     with (
@@ -138,16 +142,16 @@ def _train(
                 if name != "steps":
                     board.add_scalar(f"training/{name}", value, learner.steps)
             if len(history) % config.checkpoint_every == 0:
-                saved = _save(config.out, learner, seconds, history, machines)
+                saved = _save(config.out, learner, seconds, history, stretches)
     if saved != learner.steps:
-        _save(config.out, learner, seconds, history, machines)
+        _save(config.out, learner, seconds, history, stretches)
     return RunResult(config.out, learner.steps, seconds, control_dt, tuple(history))
 
 
 def _save(
-    run: Path, learner: Learner, seconds: float, history: History, machines: list[str]
+    run: Path, learner: Learner, seconds: float, history: History, stretches: list[Stretch]
 ) -> int:
-    replace(learner.state(seconds, history), machines=machines).save(run)
+    replace(learner.state(seconds, history), stretches=stretches).save(run)
     keep_newest(run, KEEP_CHECKPOINTS)
     write_history(run, history)
     return learner.steps

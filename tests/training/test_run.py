@@ -17,6 +17,7 @@ from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint, checkpoints
 from omni_envs.training.config import PPOConfig, TrainConfig
 from omni_envs.training.run import train
+from omni_envs.training.stretches import machines
 
 ROLLOUT = 8 * 16
 MODES = {"sb3": AutoresetMode.SAME_STEP, "torchrl": AutoresetMode.DISABLED}
@@ -105,12 +106,14 @@ def test_resuming_a_finished_run_changes_nothing(config, env, tmp_path):
 
 def test_the_checkpoint_tells_what_trained(config, env, tmp_path, monkeypatch):
     train(config(tmp_path, num_threads=1), env=env())
-    assert Checkpoint.load(checkpoints(tmp_path)[-1]).machines == ["1 CPU core"]
+    (stretch,) = Checkpoint.load(checkpoints(tmp_path)[-1]).stretches
+    assert (stretch["from"], stretch["machine"]) == (0, "1 CPU core")
     for k, name in enumerate(("16 CPU cores, a GPU", "1 CPU core"), start=5):
         monkeypatch.setattr("omni_envs.training.run.machine", lambda *_, name=name: name)
         train(config(tmp_path, k * ROLLOUT), resume=True, env=env())
-    told = Checkpoint.load(checkpoints(tmp_path)[-1]).machines
-    assert told == ["16 CPU cores, a GPU", "1 CPU core"]
+    told = Checkpoint.load(checkpoints(tmp_path)[-1]).stretches
+    assert [s["from"] for s in told] == [0, 4 * ROLLOUT, 5 * ROLLOUT]
+    assert machines(told) == ["1 CPU core", "16 CPU cores, a GPU"]
 
 
 def test_resuming_twice_gives_the_same_weights(config, env, tmp_path):

@@ -1,0 +1,130 @@
+"""A run that goes on with other settings: what may change, and the commands that repeat it."""
+
+import shlex
+from dataclasses import asdict, replace
+
+import pytest
+import torch
+import tyro
+
+pytest.importorskip("stable_baselines3")
+import train as script
+from omni_envs.errors import InvalidOptionError
+from omni_envs.training.checkpoint import Checkpoint
+from omni_envs.training.command import overlay
+from omni_envs.training.config import TrainConfig, merged
+from omni_envs.training.recipes import RECIPES
+from omni_envs.training.stretches import (
+    check_changes,
+    commands,
+    lengthened,
+    machines,
+    set_exploration,
+)
+
+ENV = "OmniEnvs/G1BoxCarry-v0"
+
+
+@pytest.fixture
+def config(tmp_path) -> TrainConfig:
+    return RECIPES["small"].config(ENV, tmp_path / "run", 1000)
+
+
+def later(config: TrainConfig, **changes) -> TrainConfig:
+    """The settings that going on with these words gives."""
+    config.save()
+    flags = {"env": ENV, "steps": 2000, "out": config.out, **changes}
+    words = [word for k, v in flags.items() for word in (f"--{k.replace('_', '-')}", str(v))]
+    return script.make_config(tyro.cli(script.Arguments, args=["--resume", *words]))
+
+
+def test_options_are_laid_over_the_saved_ones(config):
+    now = later(config, num_envs=8, ppo='{"epochs": 3}', training_options='{"physics": "fast"}')
+    assert now.num_envs == 8 and now.ppo == replace(config.ppo, epochs=3)
+    assert now.training_options == {**config.training_options, "physics": "fast"}
+    assert (now.seed, now.env_options) == (config.seed, config.env_options)
+
+
+def test_what_cannot_change_is_refused(config):
+    with pytest.raises(InvalidOptionError, match="--env-options"):
+        later(config, env_options='{"preset": "beyondmimic"}')
+    for changed in (
+        replace(config, env_options={"preset": "beyondmimic"}),
+        replace(config, trainer="torchrl"),
+        replace(config, ppo=replace(config.ppo, hidden=(8,))),
+        replace(config, ppo=replace(config.ppo, critic_learning_rate=0.0)),
+    ):
+        with pytest.raises(InvalidOptionError, match="must stay"):
+            check_changes(config, changed)
+    check_changes(config, replace(config, num_envs=8, training_options={"physics": "fast"}))
+
+
+def test_a_stretch_begins_where_settings_or_machine_change(config):
+    one = lengthened([], config, 0, "2 CPU cores")
+    assert lengthened(one, replace(config, steps=10**6), 500, "2 CPU cores") == one
+    two = lengthened(one, config, 500, "16 CPU cores")
+    assert [s["from"] for s in two] == [0, 500]
+    three = lengthened(two, replace(config, num_envs=8), 500, "2 CPU cores")
+    assert [s["from"] for s in three] == [0, 500]  # the second taught nothing
+    assert machines(three) == ["2 CPU cores"]
+
+
+def test_the_commands_repeat_the_run(config):
+    """Typed one after the other they lead through the same settings."""
+    settings = [
+        config,
+        replace(config, num_envs=8, num_threads=2, device="auto"),
+        replace(
+            config,
+            num_envs=8,
+            num_threads=2,
+            device="auto",
+            training_options={
+                "observation": {"privileged": True},
+                "reset": {"start_share": 0.3},
+                "reward": {"anchor_position": {"weight": 2.0, "sigma": 0.2}},
+            },
+            ppo=replace(config.ppo, epochs=3, initial_std=0.3),
+        ),
+    ]
+    stretches = []
+    for k, setting in enumerate(settings):
+        stretches = lengthened(stretches, setting, 1000 * k, "a machine")
+    lines = commands(replace(settings[-1], steps=3000), stretches)
+    assert len(lines) == 3
+    for k, (line, expected) in enumerate(zip(lines, settings, strict=True)):
+        words = shlex.split(line)
+        assert words[:2] == ["python", "train.py"] and ("--resume" in words) == (k > 0)
+        again = script.make_config(tyro.cli(script.Arguments, args=words[2:]))
+        again.save()
+        assert again.steps == 1000 * (k + 1)
+        assert (again.num_envs, again.device) == (expected.num_envs, expected.device)
+        assert again.num_threads == (expected.num_threads if k else 0)
+        assert asdict(again.ppo) == asdict(expected.ppo)
+        # Growth is gone by being None.
+        options = merged({}, again.training_options)
+        reset = {n: v for n, v in options.get("reset", {}).items() if v is not None}
+        assert {**options, "reset": reset} == {"reset": {}, **expected.training_options}
+
+
+def test_overlay_undoes_what_is_gone():
+    old = {"a": {"x": 1, "y": 2}, "b": 3, "same": {"z": 0}}
+    new = {"a": {"y": 5}, "c": 4, "same": {"z": 0}}
+    changes = overlay(old, new)
+    assert changes == {"a": {"x": None, "y": 5}, "b": None, "c": 4}
+    assert merged(old, changes) == {"a": {"x": None, "y": 5}, "b": None, "same": {"z": 0}, "c": 4}
+
+
+def test_exploration_starts_again_where_it_is_asked_for(config):
+    log_std = torch.tensor([0.1, 0.2, 0.4]).log()
+    empty = torch.zeros(0)
+    state = Checkpoint(0, 0.0, 0, 1e-3, {"log_std": log_std.clone()}, {}, empty)
+    set_exploration(state, config)
+    assert torch.equal(state.policy["log_std"], log_std)
+    state.stretches = lengthened([], config, 0, "a machine")
+    set_exploration(state, config)
+    assert torch.equal(state.policy["log_std"], log_std)
+    set_exploration(state, replace(config, ppo=replace(config.ppo, initial_std=0.3)))
+    std = state.policy["log_std"].exp()
+    torch.testing.assert_close(std / std[0], torch.tensor([1.0, 2.0, 4.0]))
+    assert std.log().mean().exp().item() == pytest.approx(0.3)
