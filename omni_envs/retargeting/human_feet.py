@@ -14,8 +14,9 @@ from omni_envs.scenes import Terrain
 
 # The surface under a toe is probed from this high above it, at four places this far from it (m).
 # Where they find normals further apart than this (rad), or steeper ones, as at an edge, the support
-# counts as level.
+# counts as level; so it does where there is nothing near (m): a variation has moved it away.
 _ABOVE, _AROUND, _FLAT, _STEEP = 0.03, 0.02, np.deg2rad(5.0), 0.5
+_NEAR = 0.06
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ def support_normals(terrain: Terrain | None, points: np.ndarray) -> np.ndarray:
         found, gap = terrain.heightfield.closest_points(probes)
         closest = np.where((gap < distance)[:, None], found, closest)
         distance = np.minimum(distance, gap)
-    level = (distance < 1e-4) | (distance >= probes[:, 2])
+    level = (distance < 1e-4) | (distance > _NEAR) | (distance >= probes[:, 2])
     with np.errstate(invalid="ignore"):
         up = np.where(level[:, None], (0.0, 0.0, 1.0), (probes - closest) / distance[:, None])
     up = up.reshape(len(points), -1, 3)

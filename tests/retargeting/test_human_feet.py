@@ -18,6 +18,9 @@ def test_normals_are_those_of_the_surface_below_and_vertical_at_edges():
     found = support_normals(SLOPE.terrain, np.array(points))
     np.testing.assert_allclose(found, [UP, UPHILL, UP, UP], atol=1e-6)
     assert (support_normals(None, np.zeros((2, 3))) == UP).all()
+    # A toe that a lowered terrain has left in the air.
+    above = np.array([[0.5, 0.1, 0.5 * np.tan(ANGLE) + 0.08]])
+    np.testing.assert_array_equal(support_normals(SLOPE.terrain, above), [UP])
 
 
 def test_uneven_ground_has_normals_too():
