@@ -205,7 +205,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         self._lead = np.empty((0, self.robot.num_joints))
         if targets is not None:
             self._lead = (targets - self.robot.default_joint_array) / self._scale
-        self._started = False
+        self._started, self._over = False, np.zeros(num_envs, bool)
         names = (*self._task.figures, *self._task.flags, *PLACE)
         self._infos, self._start_infos = Infos(names, num_envs), Infos(PLACE, num_envs)
         self.policy_layout, self.critic_layout = plain.policy_layout, plain.critic_layout
@@ -353,10 +353,12 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
             self.observations,
         )
         if self.sampler.adapts:
-            failed = judged.terminated.nonzero()[0]
+            failed = (judged.terminated & ~self._over).nonzero()[0]
             self.sampler.record(episodes.motion[failed], frame[failed])
         if judged.some_done:
-            finished = judged.done.nonzero()[0]
+            # An episode counts once, however long nobody resets its simulation.
+            finished = (judged.done & ~self._over).nonzero()[0]
+            self._over |= judged.done
             lasted = episodes.elapsed[finished], episodes.possible[finished]
             self._gate.record(*lasted)
             self._noise.record(*lasted)
@@ -419,6 +421,7 @@ class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
         if not len(ids):
             return
         rng, task, episodes = self.np_random, self._task, self._episodes
+        self._over[ids] = False
         # All chance of a start in one draw: frame, model, share of the noise, clocks, state.
         draws = rng.random((4 + episodes.draws + task.draws, len(ids)))
         motions, places = self.sampler.draw(draws[:2])

@@ -113,6 +113,18 @@ def test_disabled_waits_for_the_mask(make):
     assert "final_obs" not in infos
 
 
+def test_an_episode_that_nobody_resets_counts_once(make):
+    env = make(autoreset_mode="DISABLED", reset={"start": "adaptive"})
+    env.reset(seed=1)
+    nothing = np.full((4, 29), np.nan)
+    assert all(env.step(nothing)[2].all() for _ in range(4))
+    once = 4 * (1.0 - env.config.reset.adaptive.decay)
+    assert env.sampler.failures.sum() == pytest.approx(once, rel=0.01)
+    env.reset(options={"reset_mask": np.array([True, False, False, False])})
+    env.step(nothing)
+    assert env.sampler.failures.sum() == pytest.approx(1.25 * once, rel=0.01)
+
+
 def test_a_reset_mask_leaves_the_others_course_alone(make, quiet):
     a, b = (make(**quiet, autoreset_mode="DISABLED") for _ in range(2))
     for env in (a, b):
