@@ -77,7 +77,7 @@ DERIVED = {
         ({"object": OFF | {"inertia": (0.5, 1.5)}}, {"body_inertia"}),
         ({"object": OFF | {"shape": 0.1}}, {"geom_size", "body_inertia", "body_iquat"}),
     ],
-    ids=lambda v: "-".join(v),
+    ids=lambda v: "-".join(sorted(v)),
 )
 def test_nothing_else_of_the_model_changes(started, randomization, fields):
     env = started(20, **only(**randomization))
