@@ -57,8 +57,8 @@ class RetargetOptions:
 
     Attributes:
         surface_points: Points on object or terrain in the interaction mesh (OmniRetarget: 100).
-        ground_points: Most points of the ground beside terrain that are in the mesh, too
-            (OmniRetarget's climbs: none).
+        ground_points: Most points of the ground beside terrain that are in the mesh, too. They
+            tell a swinging foot where the ground is before it lands. (OmniRetarget's climbs: none.)
         laplacian_weight: Weight of the deformation energy (OmniRetarget: 10).
         smoothness_weight: Weight of the distance to the previous frame (OmniRetarget: 0.2).
         contact_weight: Weight of the distance between a touching link and the point of the surface
@@ -92,7 +92,7 @@ class RetargetOptions:
     """
 
     surface_points: int = 100
-    ground_points: int = 0
+    ground_points: int = 60
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
     contact_weight: float = 400.0

@@ -24,6 +24,7 @@ OFFICIAL = RetargetOptions(
     self_collision=False,
     velocity_limits=None,
     contact_weight=0.0,
+    ground_points=0,
     convergence=1e-5,
 )
 
