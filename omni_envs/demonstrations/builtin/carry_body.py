@@ -31,6 +31,9 @@ from omni_envs.demonstrations.builtin.motion import (
 # Lengths in m, angles in rad.
 _CARRY_AHEAD, _CARRY_HEIGHT = 0.385, 0.88  # box centre from the centre of mass, and over ground
 _GRIP_UP = 0.12  # palms over the box centre
+# The hands come down wide of the box and close on it from the sides: whoever copies this with a box
+# that is somewhat wider, or stands somewhat beside its place, does not land on top of it.
+_OPEN, _ABOVE = 0.15, 0.2  # beside the faces, and above the grip, before they come down; m
 _GRIP_DOWN = np.deg2rad(32.0)  # fingers below the horizontal while gripping
 _STAND, _WALK, _SQUAT = 0.920, 0.907, 0.545  # pelvis heights
 _LEAN = np.deg2rad(56.0)  # of the chest at the bottom of the squat
@@ -136,11 +139,12 @@ def _hands(
     box_yaw: np.ndarray,
 ) -> human.Hands:
     """Arms that swing with the stride, reach beside the box, hold it and let go."""
-    reach = ramp(time, plan.squat[1] - 0.75, plan.squat[1] + 0.05)
+    reach = ramp(time, plan.squat[1] - 0.95, plan.squat[1] - 0.15)
     reach -= ramp(time, plan.rise[0] - 0.05, plan.rise[0] + 0.7)
-    close = ramp(time, plan.squat[1] - 0.35, plan.grasp) - ramp(
+    close = ramp(time, plan.squat[1] - 0.05, plan.grasp) - ramp(
         time, plan.release, plan.release + 0.4
     )
+    above = _ABOVE * (1 - ramp(time, plan.squat[1] - 0.5, plan.squat[1] + 0.1))
     low = ramp(time, *plan.squat) - ramp(time, *plan.rise)
     yaw = chest_turn[:, 0]
     body, crate = human.turn(yaw), human.turn(box_yaw)
@@ -164,8 +168,9 @@ def _hands(
         # On the box: palm on the side face, fingers forward and down.
         grip_fingers = crate @ np.array([np.cos(_GRIP_DOWN), 0.0, -np.sin(_GRIP_DOWN)])
         inward = crate @ np.array([0.0, -sign, 0.0])
-        gap = 0.5 * BOX_SIZE[1] + 0.07 * (1 - close)
-        palm = box - gap[:, None] * inward + [0.0, 0.0, _GRIP_UP]
+        gap = 0.5 * BOX_SIZE[1] + _OPEN * (1 - close)
+        palm = box - gap[:, None] * inward
+        palm[:, 2] += _GRIP_UP + above
         gripping = palm - human.PALM * grip_fingers - human.PALM_DEPTH * inward
         w = reach[:, None]
         wrists[:, i] = hanging + w * (gripping - hanging)

@@ -72,7 +72,7 @@ def plan_box_carry() -> Plan:
 
     t = walk(0.75, [(0.29, 0, 0), (0.62, 0, 0), (0.91, 0, 0), (0.91, 0, 0)], 0, 0.64, 0.48)
     squat = t + 0.05, t + 1.35
-    grasp = squat[1] + 0.10
+    grasp = squat[1] + 0.35
     lift = grasp + 0.10, grasp + 1.40
     t = lift[1] + 0.25
     x, y = 0.91, 0.0
@@ -84,7 +84,7 @@ def plan_box_carry() -> Plan:
     t = walk(t, centres, 0, 0.66, 0.48, 0.30)
     lower = t + 0.05, t + 1.40
     release = lower[1] + 0.10
-    rise = release + 0.12, release + 1.40
+    rise = release + 0.30, release + 1.60
     t = rise[1] + 0.15
     back = [(x - s * np.cos(TURN), y - s * np.sin(TURN), TURN) for s in (0.20, 0.20)]
     t = walk(t, back, 0, 0.62, 0.46, 0.20, 0.0)
