@@ -76,7 +76,7 @@ def their_points(shared, climb, monkeypatch):
     share = np.where(share.sum(axis=1, keepdims=True) > 1.0, 1.0 - share, share)
     points = climb.scale * (a[chosen] + share[:, :1] * u[chosen] + share[:, 1:] * v[chosen])
     surface = SurfacePoints(points, points)
-    monkeypatch.setattr(interaction_mesh, "surface_points", lambda source, count: surface)
+    monkeypatch.setattr(interaction_mesh, "surface_points", lambda *_: surface)
 
 
 @pytest.fixture(scope="module")
