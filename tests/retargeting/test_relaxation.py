@@ -52,7 +52,10 @@ def test_stance_gives_way_first(swaying, options):
     assert tuple(told) == RELAXATIONS == ("stance", "self_collision", "penetration")
     assert told["stance"].max() > 0.05
     assert told["self_collision"].max() <= TOLD
-    assert told["penetration"].max() <= (TOLD if options.velocity_limits == 1.0 else 0.01)
+    # A box that jolts at 3 m/s: at full speed the robot gets out of its way but for single frames.
+    full = options.velocity_limits == 1.0
+    assert told["penetration"].max() <= (2e-3 if full else 0.01)
+    assert not full or (told["penetration"] > TOLD).mean() <= 0.05
     speeding, beyond, _ = excess(motion, options.velocity_limits)
     assert speeding <= 0.0 and beyond <= 0.0
 
