@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from omni_envs.errors import InvalidOptionError
+from omni_envs.errors import InvalidOptionError, OmniEnvsError
 
 
 def torch_device(name: str) -> torch.device:
@@ -88,3 +89,24 @@ def read(figures: list[dict[str, Tensor]]) -> list[dict[str, float]]:
         return []
     rows = torch.stack([torch.stack([*row.values()]) for row in figures]).tolist()
     return [dict(zip(row, values, strict=True)) for row, values in zip(figures, rows, strict=True)]
+
+
+def read_and_clear(taken: list[dict[str, Tensor]], lasted: str) -> list[dict[str, float]]:
+    """Reads the figures of the gradient steps that were not read yet, and forgets them.
+
+    Args:
+        taken: As ``read`` takes them; empty afterwards.
+        lasted: How long training has lasted, in words, for the error.
+
+    Raises:
+        OmniEnvsError: A figure is not finite.
+    """
+    figures = read(taken)
+    taken.clear()
+    for row in figures:
+        if not all(map(math.isfinite, row.values())):
+            raise OmniEnvsError(
+                f"Training diverged after {lasted}: {row}. "
+                "Resume from a checkpoint with a smaller learning rate."
+            )
+    return figures

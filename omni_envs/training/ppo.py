@@ -9,13 +9,12 @@ that a rollout and its update see the same network.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from omni_envs.errors import MissingDependencyError, OmniEnvsError
+from omni_envs.errors import MissingDependencyError
 
 try:
     import torch
@@ -27,7 +26,7 @@ except ImportError as error:
     raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
 
 from omni_envs.training.config import PPOConfig
-from omni_envs.training.device import read, second_worker
+from omni_envs.training.device import read_and_clear, second_worker
 from omni_envs.training.learning_rate import adapted_learning_rate
 from omni_envs.training.policy import TrackingPolicy
 from omni_envs.training.torch_threads import torch_threads
@@ -185,12 +184,12 @@ class TrackingPPO(PPO):
                     value = second.submit(self._critic_backward, batch)
                     taken.append(self._actor_backward(batch) | value.result())
                     if config.adapt_every == "minibatch":
-                        figures += self._read(taken)
+                        figures += read_and_clear(taken, f"{self.num_timesteps} steps")
                         self._adapt_learning_rate(figures[-1]["kl"])
                     nn.utils.clip_grad_norm_(policy.parameters(), config.max_grad_norm)
                     policy.optimizer.step()
                 self._n_updates += 1
-        figures += self._read(taken)
+        figures += read_and_clear(taken, f"{self.num_timesteps} steps")
         if config.adapt_every == "update":
             last = figures[-config.minibatches :]
             self._adapt_learning_rate(sum(row["kl"] / config.minibatches for row in last))
@@ -199,18 +198,6 @@ class TrackingPPO(PPO):
             "learning_rate": self.current_learning_rate,
             "action_std": policy.log_std.exp().mean().item(),
         }
-
-    def _read(self, taken: list[dict[str, Tensor]]) -> list[dict[str, float]]:
-        """Empties the list of what was not read yet; a GPU has to have come so far."""
-        figures = read(taken)
-        taken.clear()
-        for row in figures:
-            if not all(map(math.isfinite, row.values())):
-                raise OmniEnvsError(
-                    f"Training diverged after {self.num_timesteps} steps: {row}. "
-                    "Resume from a checkpoint with a smaller learning rate."
-                )
-        return figures
 
     def _actor_backward(self, batch: Rollout) -> dict[str, Tensor]:
         """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""

@@ -12,10 +12,9 @@ rollout and its update see the same network.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from omni_envs.errors import MissingDependencyError, OmniEnvsError
+from omni_envs.errors import MissingDependencyError
 
 try:
     import torch
@@ -29,7 +28,7 @@ except ImportError as error:
     raise MissingDependencyError("torchrl", "torchrl", "Training with TorchRL") from error
 
 from omni_envs.training.config import PPOConfig
-from omni_envs.training.device import read, second_worker
+from omni_envs.training.device import read_and_clear, second_worker
 from omni_envs.training.learning_rate import adapted_learning_rate
 from omni_envs.training.torchrl_network import TrackingNetwork
 
@@ -141,12 +140,12 @@ class TensorDictPPO:
                     value = second.submit(self.critic_backward, batch)
                     taken.append(self.actor_backward(batch) | value.result())
                     if config.adapt_every == "minibatch":
-                        figures += self._read(taken)
+                        figures += read_and_clear(taken, f"{self.updates} passes")
                         self.adapt_learning_rate(figures[-1]["kl"])
                     nn.utils.clip_grad_norm_(self.network.parameters(), config.max_grad_norm)
                     self.optimizer.step()
                 self.updates += 1
-        figures += self._read(taken)
+        figures += read_and_clear(taken, f"{self.updates} passes")
         if config.adapt_every == "update":
             last = figures[-config.minibatches :]
             self.adapt_learning_rate(sum(row["kl"] / config.minibatches for row in last))
@@ -155,18 +154,6 @@ class TensorDictPPO:
             "learning_rate": self.learning_rate,
             "action_std": self.network.log_std.exp().mean().item(),
         }
-
-    def _read(self, taken: list[dict[str, Tensor]]) -> list[dict[str, float]]:
-        """Empties the list of what was not read yet; a GPU has to have come so far."""
-        figures = read(taken)
-        taken.clear()
-        for row in figures:
-            if not all(map(math.isfinite, row.values())):
-                raise OmniEnvsError(
-                    f"Training diverged after {self.updates} passes: {row}. "
-                    "Resume from a checkpoint with a smaller learning rate."
-                )
-        return figures
 
     def actor_backward(self, batch: TensorDictBase) -> dict[str, Tensor]:
         """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
