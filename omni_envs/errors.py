@@ -33,6 +33,20 @@ class InvalidOptionError(OmniEnvsError, ValueError):
     """An option with a value that is not allowed."""
 
 
+class InvalidValueError(InvalidOptionError):
+    """An option with a value that is not allowed, in parts, for whoever knows where it was written.
+
+    Args:
+        option: The option.
+        expected: What its value must be.
+        found: What it is.
+    """
+
+    def __init__(self, option: str, expected: str, found: object) -> None:
+        self.option, self.expected, self.found = option, expected, f"{found!r:.80}"
+        super().__init__(f"{option}: expected {expected}; got {self.found}.")
+
+
 class InvalidDataError(OmniEnvsError, ValueError):
     """In-memory data that breaks its contract.
 

@@ -4,6 +4,7 @@ from omni_envs.errors import (
     FileFormatError,
     InvalidDataError,
     InvalidOptionError,
+    InvalidValueError,
     MissingDependencyError,
     OmniEnvsError,
     RenderingError,
@@ -29,6 +30,13 @@ def test_file_error_names_file_field_expectation_and_finding():
 def test_data_error_names_owner_and_field():
     message = str(InvalidDataError("Demonstration 'a'", "fps", "positive", "-1"))
     assert message == "Demonstration 'a': fps must be positive; got -1."
+
+
+def test_value_error_names_option_expectation_and_finding_and_keeps_them_apart():
+    error = InvalidValueError("height", "a number", "x" * 500)
+    assert str(error).startswith("height: expected a number; got 'xxx") and len(str(error)) < 120
+    assert isinstance(error, InvalidOptionError)
+    assert (error.option, error.expected) == ("height", "a number")
 
 
 def test_missing_dependency_says_how_to_install():

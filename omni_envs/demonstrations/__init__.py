@@ -24,7 +24,8 @@ from omni_envs.demonstrations.stance import (
     stance_schedule,
 )
 from omni_envs.demonstrations.surface import closest_points
-from omni_envs.demonstrations.variation import Variation, sample_variations, variation_grid, vary
+from omni_envs.demonstrations.variation import Variation, sample_variations, variation_grid
+from omni_envs.demonstrations.varied import vary
 
 __all__ = [
     "MOCAP",

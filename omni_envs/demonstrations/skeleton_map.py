@@ -10,10 +10,10 @@ from typing import Any
 import yaml
 
 from omni_envs.demonstrations.skeleton import Skeleton
+from omni_envs.demonstrations.yaml_file import read_yaml
 from omni_envs.errors import FileFormatError, InvalidDataError
 from omni_envs.robots import CONTACT_LINKS, KEYPOINTS, SIDES
 
-_MAX_BYTES = 1 << 20
 _FIELDS = ("name", "keypoints", "head_top", "contacts", "joint_names")
 
 
@@ -117,16 +117,7 @@ def read_skeleton_map(path: str | Path) -> SkeletonMap:
         FileFormatError: The file is missing, is no YAML, or is not such a table.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FileFormatError(path, "file", "an existing YAML file", "nothing")
-    if path.stat().st_size > _MAX_BYTES:
-        found = f"{path.stat().st_size} bytes"
-        raise FileFormatError(path, "file", "a YAML file of at most 1 MiB", found)
-    try:
-        table = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, ValueError, RecursionError, OverflowError) as error:
-        found = " ".join(str(error).split())[:160]
-        raise FileFormatError(path, "content", "YAML", found) from error
+    table = read_yaml(path)
     if not isinstance(table, dict) or not all(key in _FIELDS for key in table):
         found = ", ".join(map(str, table))[:120] if isinstance(table, dict) else str(table)[:60]
         raise FileFormatError(path, "content", f"a table with {', '.join(_FIELDS)}", repr(found))

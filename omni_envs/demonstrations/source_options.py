@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, isfinite
+from math import ceil, inf
+from numbers import Real
 from pathlib import Path
 from typing import Literal, get_args
 
 from omni_envs.demonstrations.resampling import FPS, whole_step
-from omni_envs.errors import FileFormatError, InvalidOptionError
+from omni_envs.errors import FileFormatError, InvalidValueError
 
 UpAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 """Axis of the file that points up."""
@@ -54,24 +55,27 @@ class SourceOptions:
     body_model: str | Path | None = None
 
     def __post_init__(self) -> None:
-        if self.height is not None and not 0 < self.height < 3:
-            raise InvalidOptionError(f"height must be between 0 and 3 m; got {self.height}.")
-        for name, kind in (("up", UpAxis), ("unit", Unit)):
-            value, valid = getattr(self, name), get_args(kind)
-            if value is not None and value not in valid:
-                raise InvalidOptionError(f"{name} must be one of {', '.join(valid)}; got {value!r}")
-        if self.fps is not None and not MIN_FPS <= self.fps <= MAX_FPS:
-            raise InvalidOptionError(
-                f"fps must be between {MIN_FPS:g} and {MAX_FPS:g}; got {self.fps}."
-            )
-        for name in ("start", "end"):
+        for name, expected, valid in (
+            ("height", "between 0 and 3 m", lambda v: 0 < v < 3),
+            ("fps", f"between {MIN_FPS:g} and {MAX_FPS:g}", lambda v: MIN_FPS <= v <= MAX_FPS),
+            ("start", "seconds from 0 on", lambda v: 0 <= v < inf),
+            ("end", "seconds from 0 on", lambda v: 0 <= v < inf),
+        ):
             value = getattr(self, name)
-            if value is not None and not (isfinite(value) and value >= 0):
-                raise InvalidOptionError(f"{name} must be seconds from 0 on; got {value}.")
+            if value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, Real) or not valid(value):
+                raise InvalidValueError(name, f"a number {expected}", value)
+        for name, kind in (("up", UpAxis), ("unit", Unit)):
+            value = getattr(self, name)
+            if value is not None and value not in get_args(kind):
+                raise InvalidValueError(name, f"one of {', '.join(get_args(kind))}", value)
+        for name in ("skeleton", "body_model"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, str | Path):
+                raise InvalidValueError(name, "the name of a file", value)
         if self.end is not None and self.end <= (self.start or 0.0):
-            raise InvalidOptionError(
-                f"end must be later than start; got {self.start or 0.0} to {self.end} s."
-            )
+            raise InvalidValueError("end", f"later than start, {self.start or 0.0:g} s", self.end)
 
     def frame_rate(self, path: Path, field: str, stated: float | None) -> float:
         """The frame rate to believe: the option, else what the file states.

@@ -41,7 +41,7 @@ def write_card(out: str | Path, rows: Iterable[dict[str, Any]], *, previews: int
     """
     out = Path(out)
     rows = sorted(rows, key=lambda row: row["name"])
-    done = [row for row in rows if row["status"] == DONE]
+    done = [row for row in rows if row["status"] == DONE and (out / row["file"]).is_file()]
     failed = [row for row in rows if row["status"] != DONE]
     seconds = sum(row["duration_s"] for row in done)
     work = sum(row["cpu_seconds"] for row in done)

@@ -8,11 +8,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from omni_envs.demonstrations import load_demonstration
 from omni_envs.errors import InvalidOptionError, OmniEnvsError
 from omni_envs.generation.card import write_card
 from omni_envs.generation.engines import ENGINES
-from omni_envs.generation.item import DONE, Item
+from omni_envs.generation.item import DONE, Item, named_demonstration
 from omni_envs.generation.manifest import Manifest, sole_writer
 from omni_envs.generation.recipe import Recipe, SourceEntry
 from omni_envs.progress import ProgressCallback
@@ -79,8 +78,10 @@ def generate(
                 done += int(row["frames"])
                 if progress is not None:
                     progress(done, total)
-        if todo or not (out / "README.md").is_file():
-            write_card(out, manifest.rows.values(), previews=previews)
+        # What once failed and is no longer asked for is no news.
+        asked = {item.name for item in items} | {row["name"] for row in broken}
+        rows = [r for r in manifest.rows.values() if r["status"] == DONE or r["name"] in asked]
+        write_card(out, rows, previews=previews)
         failed = [r["name"] for r in _of(manifest, mine) if r["status"] != DONE]
         failed += [row["name"] for row in broken]
         return {
@@ -107,28 +108,35 @@ def plan(recipe: Recipe) -> tuple[list[Item], list[dict[str, Any]]]:
         except OmniEnvsError as error:
             row = {"name": entry.demonstration, "key": "", "frames": 0, "seconds": 0.0}
             broken.append(row | {"status": "failed", "message": str(error)})
-    names = [item.name for item in items]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise OmniEnvsError(f"Two sources of the recipe would both be called {twice[0]!r}.")
+    made: dict[str, Item] = {}
+    for item in items:
+        other = made.setdefault(item.name, item)
+        if other is not item:
+            sources = " and ".join(dict.fromkeys((other.demonstration, item.demonstration)))
+            raise OmniEnvsError(
+                f"The recipe makes {item.name!r} twice, from {sources}. Sources of one name need a "
+                "`name` of their own."
+            )
     return items, broken
 
 
 def _items(entry: SourceEntry, recipe: Recipe) -> list[Item]:
-    demonstration = load_demonstration(entry.demonstration, **entry.options)
+    words = json.dumps(dict(entry.options))
+    demonstration = named_demonstration(entry.demonstration, words, entry.name)
     frames = int((demonstration.num_frames - 1) * recipe.fps / demonstration.fps) + 1
     options = RetargetOptions(refine=recipe.refine)
     return [
         Item(
             name=f"{demonstration.name}/{robot}/{variation.name}",
             demonstration=entry.demonstration,
-            options=json.dumps(dict(entry.options)),
+            options=words,
             robot=robot,
             variation=variation,
             fps=recipe.fps,
             refine=recipe.refine,
             frames=frames,
             key=reference_key(demonstration, get_robot(robot), recipe.fps, options, variation),
+            title=entry.name,
         )
         for robot in entry.robots
         for variation in entry.variations

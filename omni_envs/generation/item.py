@@ -6,7 +6,7 @@ import hashlib
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ class Item:
         refine: Refine the whole clip.
         frames: How many frames it will have.
         key: Hash of all that it depends on.
+        title: What the demonstration is called, instead of after its file.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Item:
     refine: bool
     frames: int
     key: str
+    title: str | None = None
 
     @property
     def file(self) -> str:
@@ -65,7 +67,7 @@ def make_item(item: Item, out: str) -> dict[str, Any]:
     start, cpu = time.perf_counter(), time.process_time()
     row: dict[str, Any] = {"name": item.name, "key": item.key, "frames": item.frames}
     try:
-        demonstration = _demonstration(item.demonstration, item.options)
+        demonstration = named_demonstration(item.demonstration, item.options, item.title)
         options = RetargetOptions(refine=item.refine)
         settings: Mapping[str, Any] = {"fps": item.fps, "options": options}
         if item.variation == Variation():
@@ -104,5 +106,7 @@ def file_hash(path: Path) -> str:
 
 
 @lru_cache(maxsize=4)
-def _demonstration(name: str, options: str) -> Demonstration:
-    return load_demonstration(name, **json.loads(options))
+def named_demonstration(name: str, options: str, title: str | None) -> Demonstration:
+    """Loads a demonstration and gives it the name that it has in the recipe."""
+    demonstration = load_demonstration(name, **json.loads(options))
+    return demonstration if title is None else replace(demonstration, name=title)

@@ -12,7 +12,8 @@ from omni_envs.demonstrations import Demonstration, scale_demonstration
 from omni_envs.demonstrations.jumps import SPEED, find_jumps
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.demonstrations.source_resampling import resample_source
-from omni_envs.demonstrations.variation import Variation, vary
+from omni_envs.demonstrations.variation import Variation
+from omni_envs.demonstrations.varied import vary
 from omni_envs.errors import InvalidDataError
 from omni_envs.metrics import ReferenceReport, evaluate, missed_contacts
 from omni_envs.metrics.playback import TARGETS, play

@@ -15,11 +15,13 @@ CLIP = Path("clip")
     [
         {"height": -1.0}, {"height": np.nan}, {"up": "up"}, {"unit": "ft"}, {"fps": 0.0},
         {"fps": np.nan}, {"fps": 1e9}, {"start": -1.0}, {"start": np.inf}, {"end": 0.0},
-        {"start": 3.0, "end": 3.0},
+        {"start": 3.0, "end": 3.0}, {"height": "tall"}, {"height": True}, {"fps": "30"},
+        {"start": [1.0]}, {"end": "late"}, {"up": 3}, {"up": ["z"]}, {"unit": {}},
+        {"skeleton": 3}, {"body_model": ["a"]},
     ],
 )  # fmt: skip
 def test_values_that_make_no_sense(wrong):
-    with pytest.raises(InvalidOptionError, match=f"{list(wrong)[-1]} must"):
+    with pytest.raises(InvalidOptionError, match=f"{list(wrong)[-1]}: expected"):
         SourceOptions(**wrong)
 
 

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,15 @@ def test_broken_sources_do_not_stop_the_others(tmp_path):
     assert "broken.bvh" in rows[str(tmp_path / "broken.bvh")]["message"]
     assert "no terrain" in rows["box_carry/g1/height_2.00"]["message"]
     assert "Not made" in (out / "README.md").read_text()
+    # What is no longer asked for, and a file that somebody took away, leave the card.
+    sound = SourceEntry("box_carry", ("g1",))
+    (out / "box_carry/g1/nominal.npz").rename(out / "elsewhere.npz")
+    named = Recipe((replace(sound, name="a carry"),), 10.0, False)
+    assert generate(named, out, jobs=1, previews=1)["failed"] == 0
+    card = (out / "README.md").read_text()
+    assert "Not made" not in card and "1 references" in card and "a carry/g1/nominal" in card
+    provenance = Reference.load(out / "a carry/g1/nominal.npz").provenance
+    assert provenance["demonstration"] == "a carry"
 
 
 def test_killed_and_resumed_without_loss_or_repetition(tmp_path):
@@ -146,7 +156,7 @@ def test_bad_options_are_refused(tmp_path, capsys):
         generate(RECIPE, tmp_path, jobs=0)
     with pytest.raises(InvalidOptionError, match="shard"):
         generate(RECIPE, tmp_path, shard=(3, 2))
-    with pytest.raises(OmniEnvsError, match="both be called"):
+    with pytest.raises(OmniEnvsError, match="'box_carry/g1/nominal' twice, from box_carry\\."):
         generate(Recipe((ENTRY, ENTRY)), tmp_path)
     assert main(["generate", "none.yaml", "--out", str(tmp_path), "--shard", "half"]) == 1
     assert "i/n" in capsys.readouterr().err

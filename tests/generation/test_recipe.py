@@ -61,11 +61,16 @@ def test_files_are_relative_to_the_recipe(tmp_path):
     ("change", "message"),
     [
         ("", "recipe: expected a mapping"),
-        ("a: [", "file: expected YAML"),
-        ("!!python/object/apply:os.system ['true']", "file: expected YAML"),
+        ("a: [", "content: expected YAML"),
+        ("!!python/object/apply:os.system ['true']", "content: expected YAML"),
         ({"robots": ["g1"]}, "recipe.sources: expected to be there"),
         ({"robots": ["r2d2"]} | {"sources": MINIMAL["sources"]}, "robots.*g1"),
         (MINIMAL | {"colour": 1}, "recipe.colour: expected one of robots, sources"),
+        ("robots: [g1]\nrobots: [h1]\nsources: []", "content: .*the key 'robots' twice"),
+        ("fps: " + "1" * 5000, "content: expected YAML"),
+        ("fps: 2020-13-45", "content: expected YAML"),
+        (MINIMAL | {"robots": ["g1", "G1"]}, "robots: expected every robot once"),
+        (MINIMAL | {"robots": []}, "robots: expected a list of robot names"),
         (MINIMAL | {"fps": 0}, "fps: expected a positive number"),
         (MINIMAL | {"refine": "yes please"}, "refine: expected true or false"),
         (MINIMAL | {"sources": []}, "sources: expected a list"),
@@ -82,14 +87,27 @@ def test_bad_recipes_are_refused(tmp_path, change, message):
     ("change", "message"),
     [
         ({"options": {"colour": 1}}, "options.colour"),
+        ({"options": {"height": "tall"}}, "options.height: expected a number between"),
+        ({"options": {"up": "west"}}, "options.up: expected one of x, y"),
+        ({"options": {"object_mesh": 3}}, "options.object_mesh: expected the name of a file"),
+        ({"name": "../up"}, "name: expected letters"),
+        ({"name": 3}, "name: expected letters"),
         ({"variations": "shapes"}, "poses, heights"),
-        ({"variations": [{"object_yaw": "left"}]}, "variations"),
+        ({"variations": None}, "poses, heights"),
+        ({"variations": [{"object_yaw": "left"}]}, r"variations\[0\].object_yaw: .*a number"),
+        ({"variations": [{}, {"object_scale": [1, 1]}]}, r"variations\[1\].object_scale: .*3 num"),
         ({"variations": [{"yaw": 1}]}, r"variations\[0\].yaw"),
-        ({"grid": {"yaw": [1]}}, "no field of a variation"),
-        ({"grid": {"object_yaw": 1}}, "variations"),
+        ({"grid": {"yaw": [1]}}, "grid.yaw: expected one of object_translation"),
+        ({"grid": {"object_yaw": 1}}, "grid.object_yaw: expected a list"),
+        ({"grid": {"object_yaw": []}}, "grid.object_yaw: expected a list of at least one"),
+        ({"grid": {}}, "grid: expected at least one of"),
+        ({"grid": {"object_yaw": [0.1] * 400, "terrain_height": [1] * 400}}, "at most 100000"),
         ({"sample": {"count": 3}}, "sample.ranges"),
-        ({"sample": {"count": "many", "ranges": {}}}, "sample.count: .*a whole number"),
+        ({"sample": {"count": 3, "ranges": {}}}, "sample.ranges: expected at least one of"),
+        ({"sample": {"count": "many", "ranges": {"object_yaw": [0, 1]}}}, "sample.count: .*whole"),
+        ({"sample": {"count": 10**9, "ranges": {"object_yaw": [0, 1]}}}, "count: .*at most 100000"),
         ({"sample": {"count": 1, "ranges": {"object_yaw": [1]}}}, "lowest, highest"),
+        ({"sample": {"count": 1, "seed": -1, "ranges": {"object_yaw": [0, 1]}}}, "sample.seed"),
     ],
 )
 def test_bad_sources_are_refused(tmp_path, change, message):
@@ -108,12 +126,24 @@ def test_a_sample_counts(tmp_path, count):
         read_recipe(path)
 
 
-def test_words_instead_of_numbers_are_shown(tmp_path):
-    path = tmp_path / "recipe.yaml"
-    source = {"demonstration": "box_carry", "variations": [{"object_yaw": "left"}]}
-    path.write_text(yaml.safe_dump(MINIMAL | {"sources": [source]}))
-    with pytest.raises(FileFormatError, match=r"sources\[0\]: .*in numbers.*'object_yaw': 'left'"):
-        read_recipe(path)
+def test_sources_are_told_apart(tmp_path):
+    for name in ("S1/walk.bvh", "S2/walk.bvh", "take [1].bvh", "map.yaml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    sources = [
+        {"demonstration": "*/walk.bvh", "options": {"skeleton": "map.yaml", "height": None}},
+        {"demonstration": "S1/*.bvh", "options": {"skeleton": "lafan1"}},
+        {"demonstration": str(tmp_path / "S?" / "walk.bvh")},
+        {"demonstration": "take [1].bvh", "name": "first take"},
+    ]
+    entries = read_recipe(write(tmp_path, MINIMAL | {"sources": sources})).sources
+    names = ["S1_walk", "S2_walk", None, "S1_walk", "S2_walk", "first take"]
+    assert [e.name for e in entries] == names
+    assert entries[0].options == {"skeleton": str(tmp_path / "map.yaml")}
+    assert entries[2].options == {"skeleton": "lafan1"}
+    several = {"demonstration": "*/walk.bvh", "name": "one"}
+    with pytest.raises(FileFormatError, match="name: expected given for a single file"):
+        read_recipe(write(tmp_path, MINIMAL | {"sources": [several]}))
 
 
 def test_missing_recipe(tmp_path):
