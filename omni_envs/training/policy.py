@@ -11,9 +11,11 @@ from omni_envs.errors import InvalidDataError, MissingDependencyError
 
 try:
     import torch
+    from stable_baselines3.common.distributions import DiagGaussianDistribution
     from stable_baselines3.common.policies import ActorCriticPolicy
     from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-    from torch import nn
+    from torch import Tensor, nn
+    from torch.distributions import Normal
 except ImportError as error:
     raise MissingDependencyError("stable-baselines3", "sb3", "Training with SB3") from error
 
@@ -60,6 +62,7 @@ class TrackingPolicy(ActorCriticPolicy):
             features_extractor_class=_Untouched,
             **kwargs,
         )
+        self.action_dist = _UncheckedGaussian(action_space.shape[0])
 
     def _build_mlp_extractor(self) -> None:
         self.mlp_extractor = ActorCriticNetwork(*self._sizes, self._hidden)
@@ -77,6 +80,18 @@ class TrackingPolicy(ActorCriticPolicy):
             self.action_low,
             self.action_high,
         )
+
+
+class _UncheckedGaussian(DiagGaussianDistribution):
+    """Does not look at its numbers, for which a GPU would be waited for in every gradient step.
+
+    What is not finite is found in the figures of the update.
+    """
+
+    def proba_distribution(self, mean_actions: Tensor, log_std: Tensor) -> _UncheckedGaussian:
+        std = torch.ones_like(mean_actions) * log_std.exp()
+        self.distribution = Normal(mean_actions, std, validate_args=False)
+        return self
 
 
 class _Untouched(BaseFeaturesExtractor):

@@ -18,6 +18,8 @@ from omni_envs.training.device import read, second_worker, torch_device  # noqa:
 from omni_envs.training.learner import make_learner  # noqa: E402
 
 PACKAGES = {"sb3": "stable_baselines3", "torchrl": "torchrl"}
+UPDATES = {"sb3": "ppo", "torchrl": "torchrl_ppo"}
+"""Trainer to the module of its gradient steps: the other one's need not be installed."""
 MODES = {"sb3": AutoresetMode.SAME_STEP, "torchrl": AutoresetMode.DISABLED}
 PPO = PPOConfig(rollout_steps=8, epochs=3, minibatches=2, hidden=(16,))
 GPU = pytest.mark.skipif(not torch.cuda.is_available(), reason="torch finds no GPU")
@@ -96,13 +98,14 @@ def _update(learner):
 
 @pytest.mark.parametrize("every", ["update", "minibatch"])
 def test_gradient_steps_do_not_wait_for_a_gpu(monkeypatch, config, env, every):
+    if config.trainer == "sb3":  # as where TorchRL, which switches this off, is not installed
+        monkeypatch.setattr(torch.distributions.Distribution, "_validate_args", True)
     ppo = replace(PPO, adapt_every=every, critic_learning_rate=1e-3)
     learner = make_learner(replace(config, ppo=ppo), env())
     learner.learn()
     update, rollout = _update(learner)
     # One thread, as on a GPU: a dispatch mode sees its own thread alone.
-    monkeypatch.setattr("omni_envs.training.ppo.second_worker", _in_turn, raising=False)
-    monkeypatch.setattr("omni_envs.training.torchrl_ppo.second_worker", _in_turn, raising=False)
+    _work_in_turn(monkeypatch, config)
     readings = []
     name = "omni_envs.training.device.read"
     monkeypatch.setattr(name, lambda f: readings.append(len(f)) or read(f))
@@ -115,8 +118,10 @@ def test_gradient_steps_do_not_wait_for_a_gpu(monkeypatch, config, env, every):
     assert waits.reads <= 1 + (3 * steps if config.trainer == "torchrl" else 0)
 
 
-def _in_turn(device):
-    return second_worker(torch.device("cuda"))
+def _work_in_turn(patch, config):
+    """Has actor and critic take their steps in one thread, as on a GPU."""
+    name = f"omni_envs.training.{UPDATES[config.trainer]}.second_worker"
+    patch.setattr(name, lambda device: second_worker(torch.device("cuda")))
 
 
 def test_both_ways_of_working_learn_the_same(monkeypatch, config, env):
@@ -124,9 +129,7 @@ def test_both_ways_of_working_learn_the_same(monkeypatch, config, env):
     for in_turn in (False, True):
         with monkeypatch.context() as patch:
             if in_turn:
-                for module in ("ppo", "torchrl_ppo"):
-                    name = f"omni_envs.training.{module}.second_worker"
-                    patch.setattr(name, _in_turn, raising=False)
+                _work_in_turn(patch, config)
             learner = make_learner(config, env())
             for _ in range(3):
                 learner.learn()

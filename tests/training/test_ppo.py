@@ -186,6 +186,15 @@ def test_a_loss_that_is_not_finite_is_one_clear_error(chase):
         learner.learn(1, reset_num_timesteps=False)
 
 
+@pytest.mark.parametrize("every", ["update", "minibatch"])
+def test_a_policy_that_is_not_finite_is_one_clear_error(chase, monkeypatch, every):
+    # As where TorchRL, which switches this off, is not installed.
+    monkeypatch.setattr(torch.distributions.Distribution, "_validate_args", True)
+    fast = replace(SMALL, learning_rate=1e38, desired_kl=0.0, max_grad_norm=1e30)
+    with pytest.raises(OmniEnvsError, match=r"Training diverged after \d+ steps"):
+        _learner(chase, replace(fast, adapt_every=every)).learn(3 * 16 * 32)
+
+
 def test_same_seed_same_weights(chase):
     weights = []
     for _ in range(2):
