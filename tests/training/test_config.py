@@ -1,14 +1,11 @@
 import dataclasses
 import json
-import shlex
 from pathlib import Path
 
 import pytest
-import tyro
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.config import PPOConfig, TrainConfig, merged
-from omni_envs.training.recipes import RECIPES
 
 
 def _config(tmp_path: Path) -> TrainConfig:
@@ -83,40 +80,6 @@ def test_bad_values_are_one_clear_error(tmp_path, change, message):
     data = {**_config(tmp_path).to_dict(), **change}
     with pytest.raises(InvalidOptionError, match=message):
         TrainConfig.from_dict(data)
-
-
-@pytest.mark.parametrize("recipe", RECIPES)
-def test_the_command_is_the_shortest_that_repeats_the_run(tmp_path, recipe):
-    config = RECIPES[recipe].config("X", tmp_path, 7, seed=3)
-    words = shlex.split(config.command())
-    assert words[words.index("--recipe") + 1] == recipe
-    assert "--ppo" not in words and "--num-envs" not in words
-    assert words[words.index("--seed") + 1] == "3"
-    changed = RECIPES[recipe].config("X", tmp_path, 7, num_envs=5)
-    words = shlex.split(changed.command())
-    assert words[words.index("--num-envs") + 1] == "5"
-    assert "--ppo" not in words and words[words.index("--recipe") + 1] == recipe
-    changed = RECIPES[recipe].config("X", tmp_path, 7, ppo={"gamma": 0.5}, device="auto")
-    words = shlex.split(changed.command())
-    assert json.loads(words[words.index("--ppo") + 1]) == {"gamma": 0.5}
-    assert words[words.index("--device") + 1] == "auto" and "--env-options" not in words
-
-
-@pytest.mark.parametrize("recipe", RECIPES)
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"num_envs": 3, "ppo": {"hidden": [8, 8], "clip": 0.3}},
-        {"env_options": {"preset": "beyondmimic", "reset": {"start": "start"}}},
-        {"training_options": {"observation": {"privileged": False}, "physics": "fast"}},
-    ],
-)
-def test_the_command_repeats_a_changed_recipe(tmp_path, recipe, changes):
-    from train import Arguments, make_config
-
-    config = RECIPES[recipe].config("X", tmp_path, 7, **changes)
-    words = shlex.split(config.command())
-    assert make_config(tyro.cli(Arguments, args=words[2:])) == config
 
 
 def test_options_are_merged_field_by_field(tmp_path):

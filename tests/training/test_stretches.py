@@ -11,8 +11,7 @@ pytest.importorskip("stable_baselines3")
 import train as script
 from omni_envs.errors import InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint
-from omni_envs.training.command import overlay
-from omni_envs.training.config import TrainConfig, merged
+from omni_envs.training.config import TrainConfig
 from omni_envs.training.recipes import RECIPES
 from omni_envs.training.stretches import (
     check_changes,
@@ -111,14 +110,6 @@ def _there(options):
         return options
     kept = {name: _there(value) for name, value in options.items() if value is not None}
     return {name: value for name, value in kept.items() if value != {}}
-
-
-def test_overlay_undoes_what_is_gone():
-    old = {"a": {"x": 1, "y": 2}, "b": 3, "same": {"z": 0}}
-    new = {"a": {"y": 5}, "c": 4, "same": {"z": 0}}
-    changes = overlay(old, new)
-    assert changes == {"a": {"x": None, "y": 5}, "b": None, "c": 4}
-    assert merged(old, changes) == {"a": {"x": None, "y": 5}, "b": None, "same": {"z": 0}, "c": 4}
 
 
 def test_exploration_starts_again_where_it_is_asked_for(config):
