@@ -10,15 +10,12 @@ import torch
 
 import omni_envs  # noqa: F401  (registers the environments)
 from omni_envs.cli import main
-from omni_envs.envs import OmniVectorEnv
 from omni_envs.errors import (
     FileFormatError,
     InvalidDataError,
-    InvalidOptionError,
     UnknownNameError,
 )
 from omni_envs.export import PROFILES, closed_loop, export_run
-from omni_envs.export.description import describe
 from omni_envs.training.network_policy import NetworkPolicy, find_checkpoint, load_actor
 from omni_envs.training.onnx_policy import OnnxPolicy
 from omni_envs.training.recipes import RECIPES
@@ -130,9 +127,3 @@ def test_bad_input_is_one_clear_error(run, tmp_path):
     (tmp_path / "config.json").write_bytes((run / "config.json").read_bytes())
     with pytest.raises(FileFormatError, match="checkpoints of a run; found none"):
         export_run(tmp_path)
-
-
-def test_several_motions_do_not_fit_into_one_file(motion):
-    env = OmniVectorEnv(1, num_threads=1, reference=[motion, motion])
-    with pytest.raises(InvalidOptionError, match="holds one motion; the environment has 2"):
-        describe(env)
