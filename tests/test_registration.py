@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -77,12 +79,42 @@ def test_a_spec_with_dataclasses_survives_json(reference_file):
     assert again.unwrapped.config == env.unwrapped.config
 
 
-def test_a_spec_of_a_vector_environment_survives_json(reference_file):
+def _survives_json(make, env_id, reference, kept):
+    env = make(env_id, reference=reference)
+    assert env.spec.kwargs["reference"] == kept
+    again = make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.spec.to_json() == env.spec.to_json()
+    assert len(again.unwrapped.references) == (1 if isinstance(kept, str) else len(kept))
+    np.testing.assert_array_equal(again.reset(seed=0)[0], env.reset(seed=0)[0])
+
+
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec])
+@pytest.mark.parametrize("entry", registration.ENVIRONMENTS, ids=lambda e: e.id)
+def test_a_path_in_a_spec_survives_json(entry, reference_files, make):
+    text = reference_files[entry.robot]
+    _survives_json(make, entry.id, Path(text), text)
+
+
+@pytest.mark.parametrize("make", [gym.make, gym.make_vec])
+def test_a_reference_in_a_spec_may_be_a_text_or_a_list(reference_file, make):
+    text, path = reference_file, Path(reference_file)
+    for reference, kept in ((text, text), ([path, text], [text, text]), ((path,), [text])):
+        _survives_json(make, "OmniEnvs/G1BoxCarry-v0", reference, kept)
+
+
+@pytest.mark.parametrize("entry", registration.ENVIRONMENTS, ids=lambda e: e.id)
+def test_a_spec_without_options_survives_json(entry):
+    spec = gym.spec(entry.id)
+    assert EnvSpec.from_json(spec.to_json()) == spec
+
+
+@pytest.mark.parametrize("mode", ["DISABLED", AutoresetMode.DISABLED])
+def test_a_spec_of_a_vector_environment_survives_json(reference_file, mode):
     env = gym.make_vec(
         "OmniEnvs/G1Track-v0",
         num_envs=2,
         reference=reference_file,
-        autoreset_mode="DISABLED",
+        autoreset_mode=mode,
         physics="fast",
     )
     again = gym.make_vec(EnvSpec.from_json(env.spec.to_json()))

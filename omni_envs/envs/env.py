@@ -13,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 from omni_envs.envs.batches import Observation, row_of
 from omni_envs.envs.options import UnexpectedOptionError
+from omni_envs.envs.spec import PlainSpec
 from omni_envs.envs.vector_env import RENDER_MODES, OmniVectorEnv
 from omni_envs.errors import InvalidDataError
 
@@ -21,7 +22,7 @@ _OWN = ("num_envs", "num_threads", "autoreset_mode")
 _VECTOR_ONLY = (*_OWN, "single_observation_space", "single_action_space", "closed")
 
 
-class OmniEnv(gymnasium.Env[Observation, np.ndarray]):
+class OmniEnv(PlainSpec, gymnasium.Env[Observation, np.ndarray]):
     """A humanoid that tracks a reference motion.
 
     The code is that of ``OmniVectorEnv`` with one simulation; so are the options. All tables are

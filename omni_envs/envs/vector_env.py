@@ -28,6 +28,7 @@ from omni_envs.envs.options import autoreset_mode_of, merged_seed, refuse_unknow
 from omni_envs.envs.pictures import Pictures
 from omni_envs.envs.references import ReferenceLike, distinct_scenes, resolve_references
 from omni_envs.envs.simulation import Simulation
+from omni_envs.envs.spec import PlainSpec
 from omni_envs.envs.task import TrackingTask
 from omni_envs.envs.tasks import get_task
 from omni_envs.envs.variants import ModelVariants
@@ -61,7 +62,7 @@ RENDER_MODES = ("rgb_array",)
 """Values of ``render_mode`` beside None."""
 
 
-class OmniVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray]):
+class OmniVectorEnv(PlainSpec, VectorEnv[Observation, np.ndarray, np.ndarray]):
     """N simulations of a robot that tracks a reference; see ``OmniEnv`` for spaces and rewards.
 
     A control step: the action is held over the physics substeps; terminations and rewards compare
