@@ -17,11 +17,11 @@ class List:
 
     def run(self) -> None:  # noqa: D102
         from omni_envs.demonstrations import builtin_names
-        from omni_envs.registration import ENVIRONMENTS
+        from omni_envs.registration import environment_ids
         from omni_envs.robots import robot_names
 
         what = {
-            "environments": [env.id for env in ENVIRONMENTS],
+            "environments": [env.id for robot in robot_names() for env in environment_ids(robot)],
             "robots": list(robot_names()),
             "demonstrations": list(builtin_names()),
         }

@@ -10,6 +10,7 @@ from typing import Any
 
 from omni_envs.errors import MissingDependencyError, OmniEnvsError
 from omni_envs.generation.item import Item, make_item
+from omni_envs.robots import Robot, adopt_robots, get_robot
 from omni_envs.threads import one_maths_thread
 
 Engine = Callable[[Sequence[Item], str, int], Iterator[dict[str, Any]]]
@@ -23,7 +24,13 @@ def run_local(items: Sequence[Item], out: str, jobs: int) -> Iterator[dict[str, 
         OmniEnvsError: A process died, e.g. for lack of memory; what was finished stays.
     """
     context = multiprocessing.get_context("spawn")
-    with one_maths_thread(), ProcessPoolExecutor(min(jobs, len(items)), context) as pool:
+    jobs = min(jobs, len(items))
+    with (
+        one_maths_thread(),
+        ProcessPoolExecutor(
+            min(jobs, len(items)), context, adopt_robots, (_robots(items),)
+        ) as pool,
+    ):
         futures = [pool.submit(make_item, item, out) for item in items]
         try:
             for future in as_completed(futures):
@@ -54,14 +61,25 @@ def run_ray(items: Sequence[Item], out: str, jobs: int) -> Iterator[dict[str, An
         ray.init(num_cpus=jobs, log_to_driver=False, include_dashboard=False)
     try:
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        task = ray.remote(num_cpus=1, runtime_env={"env_vars": threads})(make_item)
-        pending = [task.remote(item, out) for item in items]
+        task = ray.remote(num_cpus=1, runtime_env={"env_vars": threads})(_make)
+        robots = ray.put(_robots(items))
+        pending = [task.remote(item, out, robots) for item in items]
         while pending:
             ready, pending = ray.wait(pending, num_returns=1)
             yield from ray.get(ready)
     finally:
         if mine:
             ray.shutdown()
+
+
+def _robots(items: Sequence[Item]) -> tuple[Robot, ...]:
+    """The robots themselves: a worker cannot know those that this process alone has registered."""
+    return tuple(get_robot(name) for name in dict.fromkeys(item.robot for item in items))
+
+
+def _make(item: Item, out: str, robots: tuple[Robot, ...]) -> dict[str, Any]:
+    adopt_robots(robots)
+    return make_item(item, out)
 
 
 ENGINES: dict[str, Engine] = {"local": run_local, "ray": run_ray}

@@ -15,7 +15,7 @@ from omni_envs.progress import ProgressCallback
 from omni_envs.references.build import make_reference
 from omni_envs.references.reference import Reference
 from omni_envs.retargeting import RetargetOptions
-from omni_envs.robots import Robot, get_robot, register_robot, robot_names
+from omni_envs.robots import Robot, adopt_robots, get_robot
 from omni_envs.threads import one_maths_thread
 
 _POLL_SECONDS = 0.2
@@ -93,8 +93,7 @@ def worker_context() -> BaseContext:
 def _start_worker(counter: Any, robot: Robot) -> None:
     global _counter
     _counter = counter
-    if robot.name not in robot_names():  # a robot from outside the package
-        register_robot(robot)
+    adopt_robots((robot,))
 
 
 def _make(

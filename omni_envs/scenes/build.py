@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -47,6 +48,11 @@ class PhysicsOptions:
     integrator: Literal["implicitfast", "discrete", "euler"] = "implicitfast"
     iterations: int = 10
     ls_iterations: int = 20
+
+
+def shown_group(groups: Iterable[int]) -> int:
+    """The geom group to look at a robot by: its looks, or what collides where it has none."""
+    return LOOKS if LOOKS in groups else COLLISION
 
 
 def build_spec(

@@ -10,7 +10,7 @@ import numpy as np
 
 from omni_envs.errors import RenderingError
 from omni_envs.robots import Robot
-from omni_envs.scenes.build import LOOKS, OBJECT, PHYSICS_ONLY, build_spec
+from omni_envs.scenes.build import COLLISION, LOOKS, OBJECT, PHYSICS_ONLY, build_spec, shown_group
 from omni_envs.scenes.scene import Scene
 
 _GHOST_RGBA = (0.25, 0.62, 0.95, 0.35)
@@ -77,7 +77,7 @@ class SceneRenderer:
         self._option = mujoco.MjvOption()
         mujoco.mjv_defaultOption(self._option)
         self._option.geomgroup[:] = 0
-        self._option.geomgroup[[0, LOOKS]] = 1
+        self._option.geomgroup[[0, LOOKS, COLLISION]] = 1
 
     def render(
         self,
@@ -167,10 +167,14 @@ def _visual_model(spec: mujoco.MjSpec, width: int, height: int) -> mujoco.MjMode
         castshadow=True,
         diffuse=(0.55, 0.55, 0.55),
     )
-    # Robot geoms that only collide are not looked at; what a scene shows is in group 0.
+    # Robot geoms that only collide are not looked at, unless there is nothing else; what a scene
+    # shows is in group 0.
+    shown = shown_group(geom.group for geom in spec.geoms)
     for geom in list(spec.geoms):
-        if LOOKS < geom.group <= PHYSICS_ONLY:
+        if LOOKS <= geom.group <= PHYSICS_ONLY and geom.group != shown:
             spec.delete(geom)
+    # Bodies may have had their mass from what was deleted; pictures need none.
+    spec.compiler.boundmass, spec.compiler.boundinertia = 1e-3, 1e-6
     return spec.compile()
 
 

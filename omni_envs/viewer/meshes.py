@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from omni_envs.robots import Robot
-from omni_envs.scenes.build import LOOKS
+from omni_envs.scenes.build import shown_group
 
 Colour = tuple[float, float, float, float]
 _ROUND = 20  # corners of a circle
@@ -19,7 +19,7 @@ def robot_meshes(robot: Robot) -> dict[str, list[tuple[Colour, trimesh.Trimesh]]
     """Returns, for each body, one mesh in the body's frame for each colour (RGBA, 0 to 1)."""
     model = robot.model
     found: dict[tuple[str, Colour], list[trimesh.Trimesh]] = defaultdict(list)
-    for geom in np.flatnonzero(model.geom_group == LOOKS):
+    for geom in np.flatnonzero(model.geom_group == shown_group(model.geom_group)):
         material = int(model.geom_matid[geom])
         rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
         colour: Colour = tuple(float(c) for c in rgba)  # type: ignore[assignment]

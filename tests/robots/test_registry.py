@@ -217,8 +217,8 @@ def test_names_are_taken_once(tmp_path: Path) -> None:
     assert get_robot("g1") is G1
 
 
-@pytest.mark.parametrize("name", ["", "Toy"])
+@pytest.mark.parametrize("name", ["", "Toy", "my robot", "../toy", "1st"])
 @pytest.mark.usefixtures("clean_table")
 def test_names_are_lower_case(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InvalidDataError, match="name must be lower-case"):
+    with pytest.raises(InvalidDataError, match="name must be lower-case letters"):
         register_robot(toy(tmp_path, name=name))

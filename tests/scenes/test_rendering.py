@@ -1,3 +1,6 @@
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +35,18 @@ def test_picture_shows_robot_object_and_ghost(renderer):
     for before, after in ((empty, robot), (robot, both), (both, ghosted)):
         changed = (np.abs(before - after).sum(-1) > 20).mean()
         assert 0.005 < changed < 0.6
+
+
+def test_a_robot_without_looks_or_inertial_elements_is_shown(renderer, tmp_path):
+    text = G1.mjcf.read_text().replace('group="2"', 'group="3"')
+    (tmp_path / "plain.xml").write_text(re.sub(r"<inertial[^>]*/>", "", text))
+    plain = replace(G1, name="plain", mjcf=tmp_path / "plain.xml")
+    other = type(renderer)(plain, SCENE, width=160, height=120)
+    far = G1.default_qpos.copy()
+    far[2] = -30.0
+    seen = [other.render(qpos).astype(int).copy() for qpos in (far, G1.default_qpos)]
+    other.close()
+    assert 0.005 < (np.abs(seen[1] - seen[0]).sum(-1) > 20).mean() < 0.6
 
 
 def test_points_are_shown(renderer):

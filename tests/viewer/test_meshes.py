@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -47,6 +49,12 @@ def test_every_visible_body_of_a_robot_has_a_mesh(name):
     for parts in meshes.values():
         for colour, mesh in parts:
             assert len(colour) == 4 and len(mesh.faces) and mesh.volume > 0
+
+
+def test_a_robot_without_looks_is_seen_by_what_collides(tmp_path):
+    (tmp_path / "plain.xml").write_text(G1.mjcf.read_text().replace('group="2"', 'group="3"'))
+    plain = replace(G1, name="plain", mjcf=tmp_path / "plain.xml")
+    assert set(robot_meshes(plain)) >= set(robot_meshes(G1))
 
 
 def test_robot_is_as_tall_as_it_stands():
