@@ -44,8 +44,8 @@ class Arguments:
     num_envs: int = 0
     """Simulations; 0 takes the recipe's."""
 
-    num_threads: int = 0
-    """Physics threads; 0 takes every core."""
+    num_threads: int | None = None
+    """Physics threads; 0 takes every core. By default every core, or those of the run to resume."""
 
     seed: int = 0
     """Seed of network, exploration and environment."""
@@ -101,7 +101,7 @@ def make_config(arguments: Arguments) -> TrainConfig:
         training_options=_mapping("--training-options", arguments.training_options),
         ppo=_mapping("--ppo", arguments.ppo),
         trainer=arguments.trainer,
-        num_threads=arguments.num_threads,
+        num_threads=arguments.num_threads or 0,
         seed=arguments.seed,
         **ends,
     )
@@ -111,13 +111,13 @@ def _going_on(arguments: Arguments, config: TrainConfig) -> TrainConfig:
     """Lays the options that were given over the settings that a run was saved with."""
     if arguments.env_options != "{}":
         raise InvalidOptionError("--env-options: the task of a run that goes on cannot change.")
-    data = config.to_dict()
+    data, threads = config.to_dict(), arguments.num_threads
     options = _mapping("--training-options", arguments.training_options)
     return TrainConfig.from_dict(
         {
             **data,
             "num_envs": arguments.num_envs or config.num_envs,
-            "num_threads": arguments.num_threads or config.num_threads,
+            "num_threads": config.num_threads if threads is None else threads,
             "training_options": merged(config.training_options, options),
             "ppo": data["ppo"] | _mapping("--ppo", arguments.ppo),
         }

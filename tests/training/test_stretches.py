@@ -44,6 +44,13 @@ def test_options_are_laid_over_the_saved_ones(config):
     assert (now.seed, now.env_options) == (config.seed, config.env_options)
 
 
+def test_every_core_is_a_number_of_threads_too(config):
+    assert later(config).num_threads == config.num_threads == 0
+    two = later(config, num_threads=2)
+    assert two.num_threads == later(two).num_threads == 2
+    assert later(two, num_threads=0).num_threads == 0
+
+
 def test_what_cannot_change_is_refused(config):
     with pytest.raises(InvalidOptionError, match="--env-options"):
         later(config, env_options='{"preset": "beyondmimic"}')
@@ -76,7 +83,7 @@ def test_the_commands_repeat_the_run(config):
         replace(
             config,
             num_envs=8,
-            num_threads=2,
+            num_threads=0,
             device="auto",
             training_options={
                 "observation": {"privileged": True},
@@ -98,7 +105,7 @@ def test_the_commands_repeat_the_run(config):
         again.save()
         assert again.steps == 1000 * (k + 1)
         assert (again.num_envs, again.device) == (expected.num_envs, expected.device)
-        assert again.num_threads == (expected.num_threads if k else 0)
+        assert again.num_threads == expected.num_threads
         assert asdict(again.ppo) == asdict(expected.ppo)
         # What is gone is None.
         assert _there(again.training_options) == _there(expected.training_options)
