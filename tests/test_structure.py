@@ -16,6 +16,7 @@ ORDER = (
     "resampling",
     "progress",
     "threads",
+    "processes",
     "rotations",
     "registration",
     "robots",

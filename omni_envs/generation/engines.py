@@ -10,6 +10,7 @@ from typing import Any
 
 from omni_envs.errors import MissingDependencyError, OmniEnvsError
 from omni_envs.generation.item import Item, make_item
+from omni_envs.processes import end_with_parent
 from omni_envs.robots import Robot, adopt_robots, get_robot
 from omni_envs.threads import one_maths_thread
 
@@ -75,6 +76,11 @@ def run_ray(items: Sequence[Item], out: str, jobs: int) -> Iterator[dict[str, An
 def _robots(items: Sequence[Item]) -> tuple[Robot, ...]:
     """The robots themselves: a worker cannot know those that this process alone has registered."""
     return tuple(get_robot(name) for name in dict.fromkeys(item.robot for item in items))
+
+
+def _start_worker(robots: tuple[Robot, ...]) -> None:
+    end_with_parent()
+    adopt_robots(robots)
 
 
 def _make(item: Item, out: str, robots: tuple[Robot, ...]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 
 from omni_envs.demonstrations import Demonstration
 from omni_envs.errors import InvalidOptionError, OmniEnvsError
+from omni_envs.processes import end_with_parent
 from omni_envs.progress import ProgressCallback
 from omni_envs.references.build import make_reference
 from omni_envs.references.reference import Reference
@@ -93,6 +94,7 @@ def worker_context() -> BaseContext:
 def _start_worker(counter: Any, robot: Robot) -> None:
     global _counter
     _counter = counter
+    end_with_parent()
     adopt_robots((robot,))
 
 
