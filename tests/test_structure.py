@@ -16,6 +16,7 @@ ORDER = (
     "resampling",
     "progress",
     "threads",
+    "compilation",
     "processes",
     "rotations",
     "registration",

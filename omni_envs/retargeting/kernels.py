@@ -1,17 +1,17 @@
 """The inner loops of a step, compiled: what is asked for once per quadratic program.
 
-Numba compiles them on first use and keeps the result in its cache next to this file, or in the
-user's cache directory where that cannot be written. Pure functions of arrays; no fast mathematics,
-so that the same input gives the same bits.
+Numba compiles them on first use and keeps the result on disk, see ``omni_envs.compilation``. Pure
+functions of arrays; no fast mathematics, so that the same input gives the same bits.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from omni_envs.compilation import Compiler
 
 Array = np.ndarray
-_compiled = njit(cache=True, nogil=True)
+_compiled = Compiler(__file__)
 
 
 @_compiled

@@ -1,5 +1,3 @@
-"""Loops without a plain counterpart; ``tests/envs/test_compiled.py`` holds the others to theirs."""
-
 import numpy as np
 
 from omni_envs.tracking import kernels
@@ -46,29 +44,3 @@ def test_models_are_drawn_from_those_of_the_scene():
     draws = np.array([0.0, 0.24, 0.25, 1.0 - 2.0**-53])
     kernels.choose_models(np.array([0, 2, 1]), np.array([0, 1, 2, 1]), 4, draws, chosen)
     assert chosen.tolist() == [0, 8, 5, 11]
-
-
-def test_sines_are_exact_to_a_rounding():
-    angles = np.random.default_rng(0).uniform(-20.0, 20.0, 10_000)
-    angles[:3] = 0.0, np.pi / 4, 1e6
-    sines, cosines = np.empty((2, 10_000))
-    kernels.sines(angles, sines, cosines)
-    np.testing.assert_allclose(sines, np.sin(angles), rtol=0, atol=2.3e-16)
-    np.testing.assert_allclose(cosines, np.cos(angles), rtol=0, atol=2.3e-16)
-
-
-def test_chance_is_uniform_and_without_memory():
-    """Ten streams, each step's seed next to the last's: the hardest case for a counter."""
-    draws = np.array([[kernels.uniform(seed, k) for k in range(5000)] for seed in range(10)])
-    assert draws.min() >= 0.0 and draws.max() < 1.0
-    np.testing.assert_allclose(
-        np.quantile(draws, [0.1, 0.25, 0.5, 0.75, 0.9], axis=1).mean(axis=1),
-        [0.1, 0.25, 0.5, 0.75, 0.9],
-        atol=0.005,
-    )
-    centred = (draws - 0.5) * np.sqrt(12.0)
-    # Standard error of a correlation of n pairs: n^-1/2.
-    assert np.abs(np.corrcoef(draws) - np.eye(10)).max() < 5 / np.sqrt(5000)
-    for lag in (1, 2, 70):
-        pairs = centred[:, lag:] * centred[:, :-lag]
-        assert abs(pairs.mean()) < 5 / np.sqrt(pairs.size)
