@@ -87,8 +87,8 @@ def observe(
             out_policy[i, numbers.noise_start + k] += share * noise[k] * numbers.noise_width[k]
         if len(out_critic) == 0:
             continue
-        k = _write_policy(
-            out_critic, i, True, table, r, at, rp, turn, p, m, qpos, qvel, default, action
+        k = _write_policy(  # bool(1): for True it would be compiled once more
+            out_critic, i, bool(1), table, r, at, rp, turn, p, m, qpos, qvel, default, action
         )
         for b in range(position.shape[1]):
             x = vector_of(position, i, b)

@@ -6,7 +6,7 @@ spend more on arguments than on arithmetic: what never changes comes as a ``Plan
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -138,38 +138,31 @@ def make_plan(numbers: Numbers, at: Columns, tree: Tree) -> Plan:
 
 
 @compiled
-def _one(values: Array, integers: Array, k: int) -> Any:
-    return values[integers[2 * k]]
-
-
-@compiled
-def _all(values: Array, integers: Array, k: int) -> Array:
-    return values[integers[2 * k] : integers[2 * k + 1]]
-
-
-@compiled
-def _rows(values: Array, integers: Array, k: int, width: int) -> Array:
-    part = _all(values, integers, k)
-    return part.reshape(len(part) // width, width)
+def _matrix(values: Array, width: int) -> Array:
+    return values.reshape(len(values) // width, width)
 
 
 @compiled
 def unpack(i: Array, r: Array) -> tuple[Numbers, Columns, Tree]:
-    """Undoes ``make_plan``, given its integers and reals, by views."""
+    """Undoes ``make_plan``, given its integers and reals, by views.
+
+    The k-th value goes from i[2 k] to i[2 k + 1]. Written out: functions that take such a number
+    would be compiled anew for each.
+    """
     numbers = Numbers(
-        _one(i, i, 0), _one(i, i, 1), _one(i, i, 2), _one(i, i, 3) != 0, _all(i, i, 4),
-        _all(i, i, 5), _all(r, i, 6), _all(r, i, 7), _all(i, i, 8), _all(r, i, 9), _all(r, i, 10),
-        _one(i, i, 11), _one(i, i, 12) != 0, _one(r, i, 13), _all(r, i, 14), _one(i, i, 15) != 0,
-        _one(i, i, 16), _all(r, i, 17),
+        i[i[0]], i[i[2]], i[i[4]], i[i[6]] != 0, i[i[8] : i[9]], i[i[10] : i[11]],
+        r[i[12] : i[13]], r[i[14] : i[15]], i[i[16] : i[17]], r[i[18] : i[19]], r[i[20] : i[21]],
+        i[i[22]], i[i[24]] != 0, r[i[26]], r[i[28] : i[29]], i[i[30]] != 0, i[i[32]],
+        r[i[34] : i[35]],
     )  # fmt: skip
     at = Columns(
-        _one(i, i, 18), _one(i, i, 19), _one(i, i, 20), _one(i, i, 21), _one(i, i, 22),
-        _one(i, i, 23), _one(i, i, 24), _one(i, i, 25),
+        i[i[36]], i[i[38]], i[i[40]], i[i[42]], i[i[44]], i[i[46]], i[i[48]], i[i[50]],
     )  # fmt: skip
     tree = Tree(
-        _all(i, i, 26), _all(i, i, 27), _rows(r, i, 28, 3), _rows(r, i, 29, 4), _all(i, i, 30),
-        _rows(r, i, 31, 3), _rows(r, i, 32, 3), _all(r, i, 33), _all(i, i, 34), _all(i, i, 35),
-        _all(i, i, 36),
+        i[i[52] : i[53]], i[i[54] : i[55]], _matrix(r[i[56] : i[57]], 3),
+        _matrix(r[i[58] : i[59]], 4), i[i[60] : i[61]], _matrix(r[i[62] : i[63]], 3),
+        _matrix(r[i[64] : i[65]], 3), r[i[66] : i[67]], i[i[68] : i[69]], i[i[70] : i[71]],
+        i[i[72] : i[73]],
     )  # fmt: skip
     return numbers, at, tree
 
