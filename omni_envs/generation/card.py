@@ -17,7 +17,7 @@ from omni_envs.references.npz import complete_file
 FIGURES = {
     "penetration_max_m": ("deepest penetration", "mm", 1e3),
     "slip_fraction_default": ("planted feet that slip", "%", 1e2),
-    "stance_drift_max_m": ("drift of planted feet", "mm", 1e3),
+    "stance_still_drift_max_m": ("drift of planted feet", "mm", 1e3),
     "contact_clean_fraction": ("clean contact", "%", 1e2),
     "contact_point_gap_mean_m": ("distance to the touched point", "cm", 1e2),
     "energy_mean": ("deformation energy", "×10⁻³", 1e3),

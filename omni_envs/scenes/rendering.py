@@ -14,7 +14,10 @@ from omni_envs.scenes.build import COLLISION, LOOKS, OBJECT, PHYSICS_ONLY, build
 from omni_envs.scenes.scene import Scene
 
 _GHOST_RGBA = (0.25, 0.62, 0.95, 0.35)
-_STANDING_ROOT_HEIGHT = 0.8
+# In heights of the robot: how far away it fits into a square picture, and its middle.
+_DISTANCE, _MIDDLE = 1.75, 0.44
+_STANDING = 1.05
+"""A root above so many heights of the standing one has climbed."""
 _SKY_RGB = (0.93, 0.95, 0.97)
 
 
@@ -25,17 +28,42 @@ class Camera:
     Attributes:
         azimuth: Degrees about z; 90 looks along +y.
         elevation: Degrees; negative looks down.
-        distance: m from the point.
+        distance: m from the point; None fits the robot into the picture.
         look_at: The point, m; None follows the robot's root, at ``height`` while the robot is on
             the ground, higher as it climbs.
-        height: Height of the followed point, m.
+        height: Height of the followed point, m; None is the middle of the standing robot.
     """
 
     azimuth: float = 125.0
     elevation: float = -11.0
-    distance: float = 2.3
+    distance: float | None = None
     look_at: tuple[float, float, float] | None = None
-    height: float = 0.58
+    height: float | None = None
+
+
+def camera_pose(camera: Camera, robot: Robot, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns where a camera is and the point that it looks at, (3,) m each.
+
+    Args:
+        camera: The camera.
+        robot: The robot that it shows.
+        qpos: (nq,) pose of the robot.
+    """
+    point = camera.look_at
+    if point is None:
+        height = _MIDDLE * robot.height if camera.height is None else camera.height
+        climbed = max(0.0, float(qpos[2]) - _STANDING * robot.default_root_height)
+        point = (float(qpos[0]), float(qpos[1]), height + climbed)
+    azimuth, elevation = np.deg2rad((camera.azimuth, camera.elevation))
+    ahead = np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
+    distance = _DISTANCE * robot.height if camera.distance is None else camera.distance
+    return np.array(point) - distance * ahead, np.array(point)
 
 
 class SceneRenderer:
@@ -58,7 +86,7 @@ class SceneRenderer:
         self, robot: Robot, scene: Scene, *, ghosts: int = 1, width: int = 640, height: int = 480
     ) -> None:
         self.width, self.height = width, height
-        self._nq = robot.nq
+        self._robot, self._nq = robot, robot.nq
         self._has_object = scene.object is not None
         self._model = _visual_model(build_spec(robot, scene), width, height)
         self._data = mujoco.MjData(self._model)
@@ -106,9 +134,8 @@ class SceneRenderer:
         camera = camera or Camera()
         view = mujoco.MjvCamera()
         view.azimuth, view.elevation = camera.azimuth, camera.elevation
-        view.distance = camera.distance
-        climbed = max(0.0, qpos[2] - _STANDING_ROOT_HEIGHT)
-        view.lookat = camera.look_at or (qpos[0], qpos[1], camera.height + climbed)
+        eye, view.lookat = camera_pose(camera, self._robot, qpos)
+        view.distance = float(np.linalg.norm(eye - view.lookat))
         self._renderer.update_scene(self._data, view, self._option)
         scene = self._renderer.scene
         if ghost_qpos is not None:

@@ -6,6 +6,7 @@ import io
 import socket
 import time
 from contextlib import redirect_stdout
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ import numpy as np
 from omni_envs.errors import MissingDependencyError, OmniEnvsError
 from omni_envs.references import Reference
 from omni_envs.robots import SIDES, get_robot
+from omni_envs.scenes.rendering import camera_pose
 from omni_envs.viewer.layers import BONES, Marks, contact_marks, mesh_edges, violations
 from omni_envs.viewer.meshes import robot_meshes
+from omni_envs.viewer.viewpoint import choose_camera
 
 SPEEDS = ("0.1×", "0.25×", "0.5×", "1×", "2×")
 _HUMAN, _MESH, _ALARM = (217, 77, 64), (90, 120, 220), (0.85, 0.1, 0.1)
@@ -44,6 +47,8 @@ class ReferencePage:
             raise MissingDependencyError("viser", "viewer", "The page of a reference") from error
         self.reference = reference
         self._deep = violations(reference)
+        self._robot = get_robot(reference.robot)
+        self._camera = replace(choose_camera(reference), distance=2.1 * self._robot.height)
         port = _free_port(host, port)
         with redirect_stdout(io.StringIO()):  # its banner; we print the address ourselves
             self.server = viser.ViserServer(host, port, label=_title(reference), verbose=False)
@@ -98,7 +103,7 @@ class ReferencePage:
         scene.set_up_direction("+z")
         scene.add_grid("/ground", 20.0, 20.0, cell_size=0.25, plane_opacity=1.0, shadow_opacity=0.3)
         self._bodies = {}
-        for body, meshes in robot_meshes(get_robot(reference.robot)).items():
+        for body, meshes in robot_meshes(self._robot).items():
             self._bodies[body] = scene.add_frame(f"/robot/{body}", show_axes=False)
             for i, (colour, mesh) in enumerate(meshes):
                 self._add_mesh(f"/robot/{body}/{i}", mesh, np.array(colour[:3]) * 255)
@@ -247,10 +252,8 @@ class ReferencePage:
         return "  \n".join(rows)
 
     def _look(self, client: Any) -> None:
-        """Puts a new visitor in front of the robot."""
-        root = self._root(self.frame)
-        client.camera.position = root + np.array([1.9, -1.9, 0.9])
-        client.camera.look_at = root
+        """Puts a new visitor where terrain does not hide the robot."""
+        client.camera.position, client.camera.look_at = self._view(self.frame)
 
     def _follow(self, frame: int) -> None:
         """Moves every visitor along with the robot."""
@@ -265,8 +268,10 @@ class ReferencePage:
 
     def _root(self, frame: int) -> np.ndarray:
         """Where to look: at the robot, steady as it bobs, higher where it climbs."""
-        x, y, z = self.reference.qpos[frame, :3]
-        return np.array([x, y, 0.5 + max(0.0, z - 0.8)])
+        return self._view(frame)[1]
+
+    def _view(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        return camera_pose(self._camera, self._robot, self.reference.qpos[frame])
 
 
 def _free_port(host: str, port: int) -> int:

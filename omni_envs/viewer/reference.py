@@ -12,6 +12,7 @@ from omni_envs.references import Reference
 from omni_envs.robots import get_robot
 from omni_envs.scenes.rendering import Camera, SceneRenderer
 from omni_envs.viewer.pictures import picture_strip, write_picture, write_video
+from omni_envs.viewer.viewpoint import choose_camera
 
 
 def reference_frames(
@@ -28,7 +29,7 @@ def reference_frames(
     Args:
         reference: What to show.
         indices: Frames to show, all by default.
-        camera: Where from; by default it follows the robot from its front left.
+        camera: Where from; by default ``choose_camera`` decides.
         width: Pixels.
         height: Pixels.
         keypoints: Show the scaled human keypoints.
@@ -38,7 +39,7 @@ def reference_frames(
     """
     robot = get_robot(reference.robot)
     renderer = SceneRenderer(robot, reference.scene, ghosts=0, width=width, height=height)
-    camera = camera or Camera()
+    camera = camera or choose_camera(reference)
     source = reference.source
     try:
         for t in range(len(reference.qpos)) if indices is None else indices:
@@ -93,7 +94,8 @@ def reference_video(reference: Reference, path: str | Path, *, every: int = 2) -
         The path.
     """
     indices = np.arange(0, len(reference.qpos), every)
-    camera = replace(Camera(), distance=3.0)
+    robot = get_robot(reference.robot)
+    camera = replace(choose_camera(reference), distance=2.3 * robot.height)  # calmer from afar
     return write_video(
         path, reference_frames(reference, indices, camera=camera), reference.fps / every
     )
