@@ -42,8 +42,8 @@ def test_from_the_side_where_no_terrain_is_in_the_way():
 
 
 def test_from_above_a_pit():
-    pit = np.full((41, 41), 0.6)
-    pit[10:31, 10:31] = 0.0
+    pit = np.full((41, 41), 0.5)
+    pit[13:28, 13:28] = 0.0
     field = HeightField(pit, (4.0, 4.0))
     camera = choose_camera(standing(scene=Scene(terrain=Terrain((), field))))
     assert camera.elevation < -20
