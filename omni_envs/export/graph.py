@@ -3,7 +3,9 @@
 A residual policy is folded into the standard action, so that ``default + scale · actions`` is its
 joint target: actions = a + (reference + lead - default) / scale. The reference comes from the
 observation, the very numbers that the network saw; the lead of a feedforward policy is a table over
-the frames. The observed previous action is the standard action in all modes, in training too.
+the frames. Stacks differ in the frame that they observe at a time step, this one or the one before
+it: the lead is that of the frame which the observation shows. The observed previous action is the
+standard action in all modes, in training too.
 """
 
 from __future__ import annotations
@@ -53,7 +55,9 @@ class PolicyGraph(nn.Module):
     outputs: ClassVar[tuple[str, ...]] = ("actions",)
     opset: ClassVar[int] = 18
     default: Tensor
+    commands: Tensor
     lead: Tensor
+    nearby: Tensor
     scale: Tensor
 
     def __init__(self, actor: nn.Module, description: PolicyDescription) -> None:
@@ -82,6 +86,11 @@ class PolicyGraph(nn.Module):
         if description.targets is not None:
             lead = description.targets - reference.joint_positions
         self.leads = bool(np.any(lead))
+        if self.leads:
+            motion = (reference.joint_positions, reference.joint_velocities)
+            self.both = description.layout.slices[COMMAND]
+            self.keep(commands=np.concatenate(motion, axis=1))
+            self.register_buffer("nearby", torch.tensor([0, -1, 1]))
         self.keep(lead=lead, default=robot.default_joint_array, scale=description.action_scale)
 
     def keep(self, **arrays: Any) -> None:
@@ -99,9 +108,18 @@ class PolicyGraph(nn.Module):
         if self.residual:
             target = obs[:, self.command]
             if self.leads:
-                target = target + self.lead[frame]
+                target = target + self.lead[self.shown(obs, frame)]
             actions = actions + (target - self.default) / self.scale
         return actions
+
+    def shown(self, obs: Tensor, frame: Tensor) -> Tensor:
+        """Returns the frame (1,), of this and its neighbours, that the observation has as command.
+
+        Of equal ones the first, this frame before all.
+        """
+        near = (frame + self.nearby).clamp(0, self.last_frame)
+        off = (self.commands[near] - obs[:, self.both]) ** 2
+        return near[off.sum(dim=-1).argmin(dim=0, keepdim=True)]
 
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Returns the shape of every input and output, in order."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
+import torch
 import yaml
 from torch import Tensor, nn
 
@@ -41,7 +41,6 @@ class UnitreeGraph(PolicyGraph):
     """
 
     inputs = ("obs",)
-    commands: Tensor
 
     def __init__(self, actor: nn.Module, description: PolicyDescription) -> None:
         if description.robot.name != "g1":
@@ -56,16 +55,16 @@ class UnitreeGraph(PolicyGraph):
                 f"got {', '.join(description.layout.names)}."
             )
         super().__init__(actor, description)
-        reference = description.reference
         self.terms = tuple((NAMES[name], term) for name, term in self.terms)
-        motion = (reference.joint_positions, reference.joint_velocities)
-        self.both = description.layout.slices[COMMAND]
-        self.keep(commands=np.concatenate(motion, axis=1))
 
     def forward(self, obs: Tensor) -> tuple[Tensor]:
         """Returns the actions (1, n)."""
+        return (self.standard_actions(obs, torch.zeros(1, dtype=torch.int64)),)
+
+    def shown(self, obs: Tensor, frame: Tensor) -> Tensor:
+        """Returns the frame (1,), of all, that the observation has as command."""
         off = (self.commands - obs[:, self.both]) ** 2
-        return (self.standard_actions(obs, off.sum(dim=-1).argmin(dim=0, keepdim=True)),)
+        return off.sum(dim=-1).argmin(dim=0, keepdim=True)
 
 
 def write_unitree(

@@ -1,4 +1,5 @@
 import json
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -7,11 +8,12 @@ pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
 pytest.importorskip("torch")
 import onnx
+import onnxruntime
 
 from omni_envs.errors import FileFormatError
 from omni_envs.references import reference_from_qpos
 from omni_envs.robots import G1, get_robot
-from omni_envs.training.onnx_policy import OnnxPolicy
+from omni_envs.training.onnx_policy import ORDER, OnnxPolicy
 
 
 def test_terms_are_in_alphabetical_order(described, export, observed):
@@ -48,13 +50,47 @@ def test_the_motion_is_the_torsos_and_ends_at_its_last_frame(motion, described, 
     assert onnx.load(files[0]).opset_import[0].version == 13
 
 
+def test_the_signature_is_what_the_stack_runs(described, export):
+    """It asks for its outputs by name, and feeds single precision under these names."""
+    _, _, files = export("holosoma", described("feedforward"))
+    session = onnxruntime.InferenceSession(files[0], providers=["CPUExecutionProvider"])
+    assert [(i.name, i.shape, i.type) for i in session.get_inputs()] == [
+        ("obs", [1, 154], "tensor(float)"),
+        ("time_step", [1, 1], "tensor(float)"),
+    ]
+    assert [(o.name, o.shape, o.type) for o in session.get_outputs()] == [
+        ("actions", [1, 29], "tensor(float)"),
+        ("joint_pos", [1, 29], "tensor(float)"),
+        ("joint_vel", [1, 29], "tensor(float)"),
+        ("ref_pos_xyz", [1, 3], "tensor(float)"),
+        ("ref_quat_xyzw", [1, 4], "tensor(float)"),
+    ]
+    fed = {"obs": np.zeros((1, 154), np.float32), "time_step": np.array([[0]], np.float32)}
+    joint_pos, quaternion = session.run(["joint_pos", "ref_quat_xyzw"], fed)
+    assert joint_pos.dtype == quaternion.dtype == np.float32
+
+
+def test_the_urdf_has_the_motors_and_the_torso_by_the_stacks_names(described, export):
+    _, file, _ = export("holosoma", described())
+    root = ElementTree.fromstring(json.loads(file.metadata["robot_urdf"]))
+    moving = [j.get("name") for j in root.iter("joint") if j.get("type") == "revolute"]
+    assert sorted(moving) == sorted(json.loads(file.metadata["dof_names"])) and len(moving) == 29
+    assert "torso_link" in [link.get("name") for link in root.iter("link")]
+
+
 def test_metadata_is_json_with_gains_and_robot(described, export):
     _, file, _ = export("holosoma", described())
+    assert set(file.metadata) == {
+        "run_path", "dof_names", "kp", "kd", "default_joint_pos", "action_scale", "command_ranges",
+        "robot_urdf", "robot_urdf_path", ORDER,
+    }  # fmt: skip
     data = {key: json.loads(value) for key, value in file.metadata.items()}
     assert data["dof_names"] == list(G1.joint_names)
     assert data["kp"] == [a.stiffness for a in G1.actuators]
     assert data["kd"] == [a.damping for a in G1.actuators]
     assert data["action_scale"] == G1.action_scale.tolist()
+    assert data["default_joint_pos"] == G1.default_joint_array.tolist()
+    assert data["command_ranges"] == {}
     assert data["robot_urdf"].startswith("<robot") and data["robot_urdf_path"] == "g1.urdf"
 
 

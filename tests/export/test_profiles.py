@@ -47,6 +47,26 @@ def test_all_profiles_give_the_same_actions(described, export, observed, tmp_pat
     assert np.abs(actions[0]).max() > 0.1
 
 
+@pytest.mark.parametrize("profile", ["beyondmimic", "holosoma"])
+@pytest.mark.parametrize("late", [0, 1])
+def test_the_lead_is_of_the_frame_that_is_observed(described, export, observed, profile, late):
+    """Stacks that observe the last run's outputs are a frame late at every time step but the first.
+
+    So are motion_tracking_controller and holosoma_inference.
+    """
+    description = described("feedforward")
+    graph, file, _ = export(profile, description)
+    for time_step in range(15):
+        shown = min(max(time_step - late, 0), 11)
+        seen = observed([shown], description)
+        with torch.no_grad():
+            action = graph.actor(torch.from_numpy(seen)).numpy()
+        expected = description.targets[shown] + description.action_scale * action
+        default = description.robot.default_joint_array
+        found = default + description.action_scale * file(seen, np.array([time_step]))
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
 @pytest.mark.parametrize("profile", ["holosoma", "unitree"])
 def test_what_a_stack_would_feed_otherwise_is_refused(described, actor, profile):
     for options in ({"observation": {}}, {"anchor": "pelvis"}):

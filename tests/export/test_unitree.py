@@ -6,8 +6,10 @@ import pytest
 pytest.importorskip("onnx")
 pytest.importorskip("onnxruntime")
 pytest.importorskip("torch")
+import onnxruntime
 import torch
 import yaml
+from scipy.spatial.transform import Rotation
 
 from omni_envs.errors import InvalidOptionError
 from omni_envs.export.profiles import WRITERS
@@ -33,8 +35,48 @@ def test_the_stack_gets_three_files(motion, described, export):
     ]  # fmt: skip
     sizes = [len(term["scale"]) for term in deploy["observations"].values()]
     assert sizes == [58, 6, 3, 29, 29, 29]
-    played = load_motion(files[2])
-    np.testing.assert_allclose(played.qpos, motion.qpos, atol=1e-6)
+    for term in deploy["observations"].values():
+        assert term["clip"] is None and term["history_length"] == 1 and set(term["scale"]) == {1.0}
+    # What it asks of a term that is not there ends the stack.
+    assert action["clip"] is None and action["joint_ids"] is None
+
+
+def test_the_signature_is_what_the_stack_runs(described, export):
+    _, _, files = export("unitree", described("feedforward"))
+    session = onnxruntime.InferenceSession(files[0], providers=["CPUExecutionProvider"])
+    (given,), (made,) = session.get_inputs(), session.get_outputs()
+    assert (given.name, given.shape, given.type) == ("obs", [1, 154], "tensor(float)")
+    assert (made.name, made.shape, made.type) == ("actions", [1, 29], "tensor(float)")
+    assert files[0].parent == files[1].parent and not list(files[0].parent.glob("*.data"))
+
+
+def test_the_motion_is_single_precision_with_the_root_first(motion, described, export):
+    _, _, files = export("unitree", described())
+    with np.load(files[2], allow_pickle=False) as file:
+        arrays = {name: file[name] for name in ("body_pos_w", "body_quat_w")}
+        arrays |= {name: file[name] for name in ("joint_pos", "joint_vel")}
+    assert {a.dtype for a in arrays.values()} == {np.dtype(np.float32)}
+    assert arrays["joint_pos"].shape == arrays["joint_vel"].shape == (12, 29)
+    np.testing.assert_allclose(arrays["joint_pos"], motion.joint_positions, atol=1e-6)
+    np.testing.assert_allclose(arrays["joint_vel"], motion.joint_velocities, atol=1e-5)
+    np.testing.assert_allclose(arrays["body_pos_w"][:, 0], motion.qpos[:, :3], atol=1e-6)
+    np.testing.assert_allclose(arrays["body_quat_w"][:, 0], motion.qpos[:, 3:7], atol=1e-6)
+    np.testing.assert_allclose(load_motion(files[2]).qpos, motion.qpos, atol=1e-6)
+
+
+def test_the_torso_is_where_the_stack_computes_it(motion, described):
+    """From root and motors 12 to 14, about z, x and y: the anchor that the policy trained with."""
+    assert G1.joint_names[12:15] == ("waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint")
+    rng = np.random.default_rng(1)
+    qpos = np.tile(G1.default_qpos, (5, 1))
+    qpos[:, 3:7] = Rotation.random(5, rng).as_quat(scalar_first=True)
+    qpos[:, 19:22] = rng.uniform(-0.5, 0.5, (5, 3))
+    moved = reference_from_qpos(G1, 50.0, qpos)
+    root = Rotation.from_quat(qpos[:, 3:7], scalar_first=True)
+    expected = root * Rotation.from_euler("ZXY", qpos[:, 19:22])
+    torso = moved.body_quaternions[:, moved.body_indices([described().anchor_body])[0]]
+    found = Rotation.from_quat(torso, scalar_first=True)
+    np.testing.assert_allclose((expected.inv() * found).magnitude(), 0.0, atol=1e-6)
 
 
 def test_a_feedforward_policy_knows_the_frame_by_the_command(described, export, observed):
