@@ -82,7 +82,7 @@ def publish(
     kept.save(out)
     # What going on would need is left out, above all the optimiser's moments.
     slim = replace(state, optimizer={}, rng=state.rng[:0], history=[], episodes=[])
-    slim = replace(slim, environment=None, device_rng=None)
+    slim = replace(slim, environment=None, device_rng=None, policy=state.acting, average=None)
     slim.save(out)
     evaluation.save(out)
     history = state.history or [{"steps": state.steps, "seconds": state.seconds}]

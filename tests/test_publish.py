@@ -38,7 +38,13 @@ def run(sway, tmp_path_factory):
         num_envs=4,
         num_threads=1,
         env_options={"reference": reference},
-        ppo={"rollout_steps": 8, "hidden": (8,), "epochs": 1, "minibatches": 1},
+        ppo={
+            "rollout_steps": 8,
+            "hidden": (8,),
+            "epochs": 1,
+            "minibatches": 1,
+            "average_updates": 3,
+        },
     )
     train(config)
     return config.out

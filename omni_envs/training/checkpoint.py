@@ -19,9 +19,9 @@ except ImportError as error:
 
 FOLDER = "checkpoints"
 _NAME = re.compile(r"step_(\d+)\.pt")
-_FORMAT = 2
-_READ = (1, 2)
-"""Formats that are read; 1 had no state of the environment."""
+_FORMAT = 3
+_READ = (1, 2, 3)
+"""Formats that are read; 1 had no state of the environment, 2 no average."""
 
 
 @dataclass
@@ -41,6 +41,7 @@ class Checkpoint:
         environment: What episodes have taught the environment; see ``environment.learning_state``.
             None in a file of format 1, and where the environment does not learn.
         device_rng: State of the GPU's random generator, or None for training on the CPU.
+        average: ``WeightAverage.state`` of the actor, or None where none is kept.
         history: One row of figures per update.
         episodes: Return and length of the episodes that finished last, which the means in
             ``history`` are over.
@@ -58,6 +59,12 @@ class Checkpoint:
     stretches: list[dict[str, Any]] = field(default_factory=list)
     environment: dict[str, Any] | None = None
     device_rng: Tensor | None = None
+    average: dict[str, Any] | None = None
+
+    @property
+    def acting(self) -> dict[str, Tensor]:
+        """Weights of the policy to evaluate and to export: averaged ones where there are any."""
+        return {**self.policy, **self.average["weights"]} if self.average else self.policy
 
     def save(self, run: Path) -> Path:
         """Writes the checkpoint into a run directory; it is there whole or not at all."""

@@ -45,6 +45,8 @@ class PPOConfig:
         hidden: Widths of the hidden layers, of actor and critic alike.
         initial_std: Standard deviation of the exploration noise at the start, in units of action; a
             run that goes on with another one starts again from that.
+        average_updates: Updates that the policy's weights are averaged over for evaluation and
+            export; 0 takes the newest. Training goes on from the newest either way.
     """
 
     rollout_steps: int = 24
@@ -63,12 +65,17 @@ class PPOConfig:
     max_grad_norm: float = 1.0
     hidden: tuple[int, ...] = (512, 256, 128)
     initial_std: float = 1.0
+    average_updates: int = 0
 
     def __post_init__(self) -> None:
         for name in ("rollout_steps", "epochs", "minibatches"):
             within(
                 "PPOConfig", name, getattr(self, name), "a whole number from 1 on", 1, whole=True
             )
+        within(
+            "PPOConfig", "average_updates", self.average_updates, "a whole number from 0 on", 0,
+            whole=True,
+        )  # fmt: skip
         for name in ("learning_rate", "initial_std", "clip", "max_grad_norm"):
             positive("PPOConfig", name, getattr(self, name))
         for name in _FROM_ZERO:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol
 
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 History = list[dict[str, float]]
 
@@ -18,6 +22,11 @@ class Learner(Protocol):
     @property
     def steps(self) -> int:
         """Control steps so far, all environments together."""
+        ...
+
+    @property
+    def weights(self) -> Mapping[str, Tensor]:
+        """Weights of the policy as they are now (``Checkpoint.policy``), not a copy."""
         ...
 
     def learn(self) -> dict[str, float]:

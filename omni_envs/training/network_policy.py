@@ -53,14 +53,14 @@ def find_checkpoint(run: str | Path, which: Which = "last") -> Path:
 
 
 def load_actor(checkpoint: Path) -> Actor:
-    """Loads the actor of a checkpoint.
+    """Loads the actor of a checkpoint, averaged over its newest updates if the run does that.
 
     Raises:
         FileFormatError: The file is missing, damaged or holds another kind of network.
     """
-    weights = Checkpoint.load(checkpoint).policy
+    state = Checkpoint.load(checkpoint)
     try:
-        return Actor.from_weights(weights).eval()
+        return Actor.from_weights(state.acting).eval()
     except (KeyError, IndexError, RuntimeError) as error:
         raise FileFormatError(
             checkpoint, "policy", "the weights of a TrackingPolicy", repr(error)

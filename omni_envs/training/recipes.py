@@ -107,6 +107,7 @@ _SMALL = PPOConfig(
     value_clip=0.0,
     entropy_weight=0.001,
     initial_std=0.5,
+    average_updates=50,
 )
 
 RECIPES: Mapping[str, Recipe] = {

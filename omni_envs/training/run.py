@@ -16,6 +16,7 @@ try:
 except ImportError as error:
     raise MissingDependencyError("tensorboard", "sb3", "Training") from error
 
+from omni_envs.training.averaging import WeightAverage
 from omni_envs.training.checkpoint import Checkpoint, checkpoints, keep_newest
 from omni_envs.training.config import TrainConfig, merged
 from omni_envs.training.curve import write_history
@@ -120,6 +121,8 @@ def _train(
     history, before, begin = state.history, state.seconds, time.perf_counter()
     here = machine(torch_device(config.device), config.num_threads)
     stretches = lengthened(state.stretches, config, learner.steps, here)
+    over = config.ppo.average_updates
+    average = WeightAverage(over, state.average) if over else None
     seconds, saved = before, learner.steps
     show = sys.stderr.isatty() if progress is None else progress
     with (
@@ -137,21 +140,29 @@ def _train(
                 **figures,
             }
             history.append(row)
+            if average:
+                average.update(learner.weights)
             display.update(row)
             for name, value in row.items():
                 if name != "steps":
                     board.add_scalar(f"training/{name}", value, learner.steps)
             if len(history) % config.checkpoint_every == 0:
-                saved = _save(config.out, learner, seconds, history, stretches)
+                saved = _save(config.out, learner, seconds, history, stretches, average)
     if saved != learner.steps:
-        _save(config.out, learner, seconds, history, stretches)
+        _save(config.out, learner, seconds, history, stretches, average)
     return RunResult(config.out, learner.steps, seconds, control_dt, tuple(history))
 
 
 def _save(
-    run: Path, learner: Learner, seconds: float, history: History, stretches: list[Stretch]
+    run: Path,
+    learner: Learner,
+    seconds: float,
+    history: History,
+    stretches: list[Stretch],
+    average: WeightAverage | None,
 ) -> int:
-    replace(learner.state(seconds, history), stretches=stretches).save(run)
+    state = learner.state(seconds, history)
+    replace(state, stretches=stretches, average=average.state if average else None).save(run)
     keep_newest(run, KEEP_CHECKPOINTS)
     write_history(run, history)
     return learner.steps

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 
 import numpy as np
 from gymnasium.vector import VectorEnv
@@ -45,6 +46,11 @@ class SB3Learner:
     def steps(self) -> int:
         """Control steps so far."""
         return self._ppo.num_timesteps
+
+    @property
+    def weights(self) -> Mapping[str, torch.Tensor]:
+        """Weights of the policy as they are now."""
+        return self._ppo.policy.state_dict()
 
     def learn(self) -> dict[str, float]:
         """Collects a rollout and updates the network; see ``Learner``."""

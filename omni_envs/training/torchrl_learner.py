@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -66,6 +66,11 @@ class TorchRLLearner:
     def steps(self) -> int:
         """Control steps so far."""
         return self._steps
+
+    @property
+    def weights(self) -> Mapping[str, torch.Tensor]:
+        """Weights of the policy as they are now."""
+        return self.ppo.network.state_dict()
 
     def learn(self) -> dict[str, float]:
         """Collects a rollout and updates the network; see ``Learner``."""

@@ -36,6 +36,7 @@ def test_defaults_are_the_published_ones():
         "max_grad_norm": 1.0,
         "hidden": (512, 256, 128),
         "initial_std": 1.0,
+        "average_updates": 0,
     }
 
 

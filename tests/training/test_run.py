@@ -16,6 +16,7 @@ from gymnasium.vector import AutoresetMode
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint, checkpoints
 from omni_envs.training.config import PPOConfig, TrainConfig
+from omni_envs.training.network_policy import load_actor
 from omni_envs.training.run import train
 from omni_envs.training.stretches import machines
 
@@ -74,6 +75,27 @@ def test_a_run_directory_holds_what_it_should(config, env, tmp_path):
     assert 0 < result.history[-1]["episode_length"] <= 20
     assert result.history[-1]["kl"] > 0
     assert 0 < result.history[-1]["body_error_m"] < 1.5
+
+
+def test_an_average_of_the_weights_acts_and_the_newest_go_on(config, env, tmp_path):
+    made = config(tmp_path)
+    made = dataclasses.replace(made, ppo=dataclasses.replace(made.ppo, average_updates=3))
+    train(made, env=env())
+    state = Checkpoint.load(checkpoints(tmp_path)[-1])
+    assert (
+        state.average["updates"] == 4 and Checkpoint.load(checkpoints(tmp_path)[0]).average is None
+    )
+    name = "action_net.weight"
+    assert not torch.equal(state.acting[name], state.policy[name])
+    assert torch.equal(state.acting["value_net.weight"], state.policy["value_net.weight"])
+    acts = load_actor(checkpoints(tmp_path)[-1])
+    assert torch.equal(acts.output.weight, state.average["weights"][name])
+    train(dataclasses.replace(made, steps=6 * ROLLOUT), resume=True, env=env())
+    assert Checkpoint.load(checkpoints(tmp_path)[-1]).average["updates"] == 6
+    # What is learnt does not depend on it.
+    other = tmp_path / "other"
+    train(config(other), env=env())
+    assert _same(state.policy, _policy(other))
 
 
 def test_a_resumed_run_goes_on_from_the_last_checkpoint(config, env, tmp_path):
