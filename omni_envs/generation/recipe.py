@@ -36,6 +36,7 @@ from omni_envs.demonstrations.yaml_file import read_yaml
 from omni_envs.errors import FileFormatError, InvalidValueError, UnknownNameError
 from omni_envs.generation.recipe_fields import check_fields
 from omni_envs.generation.recipe_variations import read_variations
+from omni_envs.references.formats.motion import RATES, is_rate
 from omni_envs.robots import get_robot
 
 _TOP = ("robots", "sources", "fps", "refine")
@@ -96,8 +97,8 @@ def read_recipe(path: str | Path) -> Recipe:
     for number, source in enumerate(data["sources"]):
         entries += _entries(path, f"sources[{number}]", source, robots)
     fps, refine = data.get("fps", 50.0), data.get("refine", True)
-    if isinstance(fps, bool) or not isinstance(fps, int | float) or not 0 < fps < 1e4:
-        raise FileFormatError(path, "fps", "a positive number", shown(fps))
+    if isinstance(fps, bool) or not isinstance(fps, int | float) or not is_rate(fps):
+        raise FileFormatError(path, "fps", RATES, shown(fps))
     if not isinstance(refine, bool):
         raise FileFormatError(path, "refine", "true or false", shown(refine))
     return Recipe(tuple(entries), float(fps), refine)

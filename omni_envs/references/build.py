@@ -18,6 +18,7 @@ from omni_envs.errors import InvalidDataError
 from omni_envs.metrics import ReferenceReport, evaluate, missed_contacts
 from omni_envs.metrics.playback import TARGETS, play
 from omni_envs.progress import ProgressCallback
+from omni_envs.references.formats.motion import RATES, is_rate
 from omni_envs.references.key import content_hashes, reference_key, versions
 from omni_envs.references.kinematics import reference_from_qpos
 from omni_envs.references.reference import Reference
@@ -59,15 +60,15 @@ def make_reference(
 
     Raises:
         UnknownNameError: No such robot.
-        InvalidDataError: The rate is not positive, the demonstration cannot be used, or the
+        InvalidDataError: The rate is not 1 to 1000, the demonstration cannot be used, or the
             variation puts the object into the robot or the ground at the start.
         InvalidOptionError: The variation changes what the scene lacks.
     """
     robot, options = get_robot(robot), options or RetargetOptions()
     variation = variation or Variation()
     varied, settings = variation != Variation(), options
-    if not 0 < fps < float("inf"):
-        raise InvalidDataError("Reference", "fps", "positive", str(fps))
+    if not is_rate(fps):
+        raise InvalidDataError("Reference", "fps", RATES, str(fps))
     # The source is resampled, not the result: so the retargeter holds every constraint on every
     # frame of the reference, and interpolation cannot break one.
     source = scale_demonstration(demonstration, robot.height)

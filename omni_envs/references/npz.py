@@ -91,6 +91,10 @@ def read_npz(path: str | Path, *, checked: bool = True) -> dict[str, np.ndarray]
     path = Path(path)
     if not path.is_file():
         raise FileFormatError(path, "file", "an existing .npz file", "nothing")
+    with path.open("rb") as start:
+        if start.read(2) != b"PK":  # NumPy would speak of pickles
+            found = "another kind of file" if path.stat().st_size else "an empty file"
+            raise FileFormatError(path, "file", "a complete .npz archive", found)
     try:
         file = np.load(path, allow_pickle=False)
         if isinstance(file, np.ndarray):

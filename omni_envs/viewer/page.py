@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from omni_envs.errors import MissingDependencyError, OmniEnvsError
+from omni_envs.errors import InvalidOptionError, MissingDependencyError, OmniEnvsError
 from omni_envs.references import Reference
 from omni_envs.robots import SIDES, get_robot
 from omni_envs.scenes.rendering import camera_pose
@@ -37,10 +37,13 @@ class ReferencePage:
 
     Raises:
         MissingDependencyError: viser is not installed.
+        InvalidOptionError: There is no such port.
         OmniEnvsError: The address cannot be listened on.
     """
 
     def __init__(self, reference: Reference, *, host: str = "127.0.0.1", port: int = 8080) -> None:
+        if not 0 <= port < 65536:
+            raise InvalidOptionError(f"port: expected 0 (any) to 65535; got {port}.")
         try:
             import viser
         except ImportError as error:

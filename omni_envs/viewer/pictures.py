@@ -45,7 +45,7 @@ def write_picture(path: str | Path, picture: np.ndarray, *, colours: int | None 
         InvalidOptionError: The suffix is not one of ``PICTURE_SUFFIXES``.
         MissingDependencyError: imageio is not installed.
     """
-    path = _checked(path, PICTURE_SUFFIXES, "picture")
+    path = checked_path(path, PICTURE_SUFFIXES, "picture")
     imageio = _imageio()
     if colours is None or path.suffix.lower() != ".png":
         imageio.imwrite(path, picture)
@@ -64,7 +64,7 @@ def write_video(path: str | Path, pictures: Iterable[np.ndarray], fps: float) ->
         InvalidOptionError: The suffix is not one of ``VIDEO_SUFFIXES``.
         MissingDependencyError: imageio is not installed.
     """
-    path = _checked(path, VIDEO_SUFFIXES, "video")
+    path = checked_path(path, VIDEO_SUFFIXES, "video")
     if path.suffix == ".gif":
         # GIF players round delays to 1/50 s.
         options: dict[str, Any] = {"duration": 1000.0 / min(fps, 50.0), "loop": 0}
@@ -76,7 +76,17 @@ def write_video(path: str | Path, pictures: Iterable[np.ndarray], fps: float) ->
     return path
 
 
-def _checked(path: str | Path, suffixes: tuple[str, ...], kind: str) -> Path:
+def checked_path(path: str | Path, suffixes: tuple[str, ...], kind: str) -> Path:
+    """Returns the path of a file to write, its folder made; said before the work, not after.
+
+    Args:
+        path: The file.
+        suffixes: How its name may end.
+        kind: What it is, for the error.
+
+    Raises:
+        InvalidOptionError: The suffix is another.
+    """
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         raise InvalidOptionError(

@@ -11,7 +11,14 @@ import numpy as np
 from omni_envs.references import Reference
 from omni_envs.robots import get_robot
 from omni_envs.scenes.rendering import Camera, SceneRenderer
-from omni_envs.viewer.pictures import picture_strip, write_picture, write_video
+from omni_envs.viewer.pictures import (
+    PICTURE_SUFFIXES,
+    VIDEO_SUFFIXES,
+    checked_path,
+    picture_strip,
+    write_picture,
+    write_video,
+)
 from omni_envs.viewer.viewpoint import choose_camera
 
 
@@ -77,6 +84,7 @@ def reference_strip(
     Returns:
         The path.
     """
+    path = checked_path(path, PICTURE_SUFFIXES, "picture")
     indices = np.linspace(0, len(reference.qpos) - 1, pictures).round().astype(int)
     frames = list(reference_frames(reference, indices, width=360, height=400))
     return write_picture(path, picture_strip(frames, columns), colours=colours)
@@ -93,6 +101,7 @@ def reference_video(reference: Reference, path: str | Path, *, every: int = 2) -
     Returns:
         The path.
     """
+    path = checked_path(path, VIDEO_SUFFIXES, "video")
     indices = np.arange(0, len(reference.qpos), every)
     robot = get_robot(reference.robot)
     camera = replace(choose_camera(reference), distance=2.3 * robot.height)  # calmer from afar

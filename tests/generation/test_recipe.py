@@ -71,7 +71,7 @@ def test_files_are_relative_to_the_recipe(tmp_path):
         ("fps: 2020-13-45", "content: expected YAML"),
         (MINIMAL | {"robots": ["g1", "G1"]}, "robots: expected every robot once"),
         (MINIMAL | {"robots": []}, "robots: expected a list of robot names"),
-        (MINIMAL | {"fps": 0}, "fps: expected a positive number"),
+        (MINIMAL | {"fps": 0}, "fps: expected 1 to 1000 frames"),
         (MINIMAL | {"refine": "yes please"}, "refine: expected true or false"),
         (MINIMAL | {"sources": []}, "sources: expected a list"),
         (MINIMAL | {"sources": [{"demonstration": "nothing.bvh"}]}, r"sources\[0\].demonstration"),

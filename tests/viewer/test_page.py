@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omni_envs.demonstrations import builtin_demonstration
-from omni_envs.errors import OmniEnvsError
+from omni_envs.errors import InvalidOptionError, OmniEnvsError
 from omni_envs.references import Reference, cached_reference
 from omni_envs.robots import G1
 from omni_envs.viewer import ReferencePage
@@ -70,6 +70,9 @@ def test_page_is_served_and_a_bad_address_refused(page, reference):
         assert b"<html" in answer.read().lower()
     with pytest.raises(OmniEnvsError, match="cannot be listened on"):
         ReferencePage(reference, host="203.0.113.1", port=8080)
+    for port in (-1, 65536):
+        with pytest.raises(InvalidOptionError, match="port: expected 0"):
+            ReferencePage(reference, port=port)
     taken = int(page.url.rsplit(":", 1)[1])
     second = ReferencePage(reference, port=taken)
     assert second.url != page.url

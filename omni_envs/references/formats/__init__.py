@@ -8,7 +8,7 @@ import numpy as np
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.references.formats.holosoma import HolosomaMotion
-from omni_envs.references.formats.motion import ForeignMotion, MotionFormat
+from omni_envs.references.formats.motion import RATES, ForeignMotion, MotionFormat, is_rate
 from omni_envs.references.formats.qpos import HolosomaRetargeter, OmniRetargetDataset
 from omni_envs.references.formats.tracking import BeyondMimic, Mjlab, UnitreeDeploy
 from omni_envs.references.formats.unitree_csv import UnitreeCsv, read_csv, write_csv
@@ -50,11 +50,11 @@ def load_motion(
 
     Raises:
         FileFormatError: The file is damaged, of no known format, or for another robot.
-        InvalidOptionError: ``fps`` is given for a file that tells it, or is not positive.
+        InvalidOptionError: ``fps`` is given for a file that tells it, or is no rate.
     """
     path, robot = Path(path), get_robot(robot)
-    if fps is not None and not 0 < fps < np.inf:
-        raise InvalidOptionError(f"fps: expected a positive number; got {fps}.")
+    if fps is not None and not is_rate(fps):
+        raise InvalidOptionError(f"fps: expected {RATES}; got {fps}.")
     arrays = read_csv(path) if path.suffix == ".csv" else read_npz(path, checked=False)
     for kind in MOTION_FORMATS.values():
         if kind.recognises(arrays, robot):

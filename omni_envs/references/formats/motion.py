@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from reprlib import repr as shown
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -15,6 +16,10 @@ from omni_envs.robots import Robot
 
 if TYPE_CHECKING:
     from omni_envs.references.reference import Reference
+
+MIN_FPS, MAX_FPS = 1.0, 1000.0
+RATES = f"{MIN_FPS:g} to {MAX_FPS:g} frames per second"
+"""Rates outside are taken for an error."""
 
 _UNIT = 1e-3  # how far the norm of a stored quaternion may be from 1
 
@@ -100,15 +105,20 @@ def read_fps(path: Path, array: np.ndarray) -> float:
     """Returns a stored rate, scalar or (1,).
 
     Raises:
-        FileFormatError: It is no positive number.
+        FileFormatError: It is no number, or no rate that motions are recorded at.
     """
     try:
-        fps = float(np.asarray(array).reshape(-1)[0])
-    except (IndexError, ValueError, TypeError) as error:
-        raise FileFormatError(path, "fps", "a number", str(array)) from error
-    if not (np.isfinite(fps) and fps > 0):
-        raise FileFormatError(path, "fps", "a positive number", str(fps))
+        fps = float(np.asarray(array).reshape(()))
+    except (ValueError, TypeError) as error:
+        raise FileFormatError(path, "fps", "one number", shown(array)) from error
+    if not is_rate(fps):
+        raise FileFormatError(path, "fps", RATES, str(fps))
     return fps
+
+
+def is_rate(fps: float) -> bool:
+    """Whether motions are made or recorded at so many frames per second."""
+    return MIN_FPS <= fps <= MAX_FPS
 
 
 def read_floats(path: Path, name: str, array: np.ndarray, dimensions: int = 2) -> np.ndarray:

@@ -98,6 +98,8 @@ def test_wrong_body_velocities_are_noticed(motion, tmp_path):
         ({"fps": 0.0}, "fps"),
         ({"fps": "fast"}, "fps"),
         ({"fps": []}, "fps"),
+        ({"fps": 1e12}, "fps"),
+        ({"fps": [30.0, 30.0]}, "fps"),
     ],
 )
 def test_bad_files_are_refused(motion, tmp_path, change, field):

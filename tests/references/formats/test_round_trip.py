@@ -121,7 +121,7 @@ def test_rate_is_asked_only_where_the_file_lacks_it(alone, tmp_path):
     path = save_motion(alone, tmp_path / "m.csv", "unitree_csv")
     assert load_motion(path).fps == 30.0
     assert load_motion(path, fps=120.0).fps == 120.0
-    with pytest.raises(InvalidOptionError, match="positive"):
+    with pytest.raises(InvalidOptionError, match="1 to 1000 frames"):
         load_motion(path, fps=0.0)
     path = save_motion(alone, tmp_path / "m.npz", "mjlab")
     with pytest.raises(InvalidOptionError, match="tells its own"):
