@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from omni_envs.errors import InvalidDataError
+
 Observation = np.ndarray | dict[str, np.ndarray]
 """(N, size), or ``{"policy": (N, size), "critic": (N, size)}``."""
 
@@ -21,6 +23,24 @@ def observation_space(policy: int, critic: int | None) -> spaces.Space:
     if critic is None:
         return box(policy)
     return spaces.Dict({"policy": box(policy), "critic": box(critic)})
+
+
+def real_array(owner: str, name: str, values: Any) -> np.ndarray:
+    """Returns values as a contiguous float64 array.
+
+    Args:
+        owner: Whose they are, for the message.
+        name: What they are, for the message.
+        values: Anything that numpy makes an array of real numbers from.
+
+    Raises:
+        InvalidDataError: It does not.
+    """
+    try:
+        return np.ascontiguousarray(values, float)
+    except (TypeError, ValueError) as error:
+        got = f"{type(values).__name__} ({error})"
+        raise InvalidDataError(owner, name, "real numbers", got) from error
 
 
 def copied(observations: Observation) -> Observation:

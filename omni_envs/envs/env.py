@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from omni_envs.envs.batches import Observation, row_of
+from omni_envs.envs.batches import Observation, real_array, row_of
 from omni_envs.envs.options import UnexpectedOptionError
 from omni_envs.envs.spec import PlainSpec
 from omni_envs.envs.vector_env import RENDER_MODES, OmniVectorEnv
@@ -206,10 +206,11 @@ class OmniEnv(PlainSpec, gymnasium.Env[Observation, np.ndarray]):
         """Advances by a control step.
 
         Raises:
-            InvalidDataError: The action has another shape, or a NaN or infinite entry.
+            InvalidDataError: The action has another shape, is no numbers, or has a NaN or infinite
+                entry.
         """
-        action = np.ascontiguousarray(action, float)
         owner = type(self).__name__
+        action = real_array(owner, "action", action)
         if action.shape != self.action_space.shape:
             expected = f"an array {self.action_space.shape}"
             raise InvalidDataError(owner, "action", expected, f"{action.shape}")

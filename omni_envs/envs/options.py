@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -66,8 +67,39 @@ def autoreset_mode_of(mode: AutoresetMode | str) -> AutoresetMode:
     return supported[name]
 
 
-def merged_seed(seeds: int | Sequence[int | None]) -> int:
-    """Returns a seed, or one seed that depends on all of a list."""
-    if isinstance(seeds, Sequence):
-        return int(np.random.SeedSequence([s or 0 for s in seeds]).generate_state(1)[0])
-    return int(seeds)
+def check_whole(name: str, value: Any, least: int) -> None:
+    """Refuses what is no whole number from ``least`` on.
+
+    Raises:
+        InvalidOptionError: It is not; the message has the name.
+    """
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        raise InvalidOptionError(f"{name} must be a whole number; got {value!r}.")
+    if value < least:
+        raise InvalidOptionError(f"{name} must be at least {least}; got {value}.")
+
+
+def merged_seed(seeds: Any, num: int) -> int | None:
+    """Returns a seed, or one seed that depends on all of a list, where any is not None.
+
+    Args:
+        seeds: A whole number, or one or None for each of the simulations.
+        num: Number of simulations.
+
+    Raises:
+        InvalidOptionError: It is something else.
+    """
+    one = isinstance(seeds, int | np.integer)
+    try:
+        each = [None if s is None else index(s) for s in ([seeds] if one else seeds)]
+        good = (one or len(each) == num) and all(s is None or s >= 0 for s in each)
+    except TypeError:
+        good = False
+    if not good:
+        raise InvalidOptionError(
+            "reset: seed must be a whole number from 0 on, or a list of these and None, one for "
+            f"each of the {num} simulations; got {seeds!r}."
+        )
+    if one or all(s is None for s in each):
+        return each[0]
+    return int(np.random.SeedSequence([s or 0 for s in each]).generate_state(1)[0])

@@ -18,13 +18,19 @@ from omni_envs.envs.batches import (
     copied,
     empty_observations,
     observation_space,
+    real_array,
 )
 from omni_envs.envs.compiled import CompiledTask, Judged
 from omni_envs.envs.divergence import Divergence, DivergenceLog
 from omni_envs.envs.episodes import Episodes, NoiseLevel, ObjectGate
 from omni_envs.envs.learning_state import learning_state, restore_learning_state
 from omni_envs.envs.model import build_model
-from omni_envs.envs.options import autoreset_mode_of, merged_seed, refuse_unknown
+from omni_envs.envs.options import (
+    autoreset_mode_of,
+    check_whole,
+    merged_seed,
+    refuse_unknown,
+)
 from omni_envs.envs.pictures import Pictures
 from omni_envs.envs.references import ReferenceLike, distinct_scenes, resolve_references
 from omni_envs.envs.simulation import Simulation
@@ -143,9 +149,10 @@ class OmniVectorEnv(PlainSpec, VectorEnv[Observation, np.ndarray, np.ndarray]):
             ("num_envs", num_envs, 1),
             ("num_threads", num_threads, 0),
             ("max_episode_steps", 1 if max_episode_steps is None else max_episode_steps, 1),
+            ("width", width, 1),
+            ("height", height, 1),
         ):
-            if value < least:
-                raise InvalidOptionError(f"{name} must be at least {least}; got {value}.")
+            check_whole(name, value, least)
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         chosen = get_task(task)
         self.config = config = make_config(
@@ -271,13 +278,15 @@ class OmniVectorEnv(PlainSpec, VectorEnv[Observation, np.ndarray, np.ndarray]):
         self, seed: int | list[int | None] | None = None, options: Options | None = None
     ) -> None:
         """Does what ``reset`` does; what comes next is in ``observations``."""
-        if seed is not None:
-            value = seed if isinstance(seed, int | np.integer) else merged_seed(seed)
-            self._np_random, self._np_random_seed = seeding.np_random(int(value))
+        value = None if seed is None else merged_seed(seed, self.num_envs)
+        if value is not None:
+            self._np_random, self._np_random_seed = seeding.np_random(value)
             self.sampler.reset()
             self._gate.reset()
             self._noise.reset()
             self._task.noise_share = self._noise.observed
+        if not isinstance(options, Mapping | None):
+            raise InvalidOptionError(f"reset: options must be a mapping or None; got {options!r}.")
         options = dict(options or {})
         for name in options:
             if name not in RESET_OPTIONS:
@@ -308,9 +317,9 @@ class OmniVectorEnv(PlainSpec, VectorEnv[Observation, np.ndarray, np.ndarray]):
             Observations, rewards, terminated, truncated, infos.
 
         Raises:
-            InvalidDataError: The actions have another shape.
+            InvalidDataError: The actions have another shape, or are no numbers.
         """
-        actions = np.ascontiguousarray(actions, float)
+        actions = real_array(type(self).__name__, "actions", actions)
         if actions.shape != self.action_space.shape:
             raise InvalidDataError(
                 type(self).__name__, "actions", f"{self.action_space.shape}", f"{actions.shape}"

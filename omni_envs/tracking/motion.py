@@ -143,8 +143,15 @@ class MotionLibrary:
         Raises:
             InvalidOptionError: There is no such motion, or no frame left to track after the start.
         """
-        motions = np.broadcast_to(np.asarray(0 if motion is None else motion), count)
-        places = np.broadcast_to(np.asarray(0 if frame is None else frame), count)
+        motions, places = (np.asarray(0 if p is None else p) for p in (motion, frame))
+        for name, given in (("motion", motions), ("frame", places)):
+            if given.shape not in ((), (count,)):
+                raise InvalidOptionError(
+                    f"reset: {name} must be one for all, or one for each of the {count} "
+                    f"simulations that start; got shape {given.shape}."
+                )
+        # Arrays of their own: loops are compiled anew for others.
+        motions, places = (np.full(count, given) for given in (motions, places))
         whole = all(np.issubdtype(a.dtype, np.integer) for a in (motions, places))
         inside = whole and np.isin(motions, np.arange(self.num_motions)).all()
         if not inside or not ((places >= 0) & (places <= self.lengths[motions] - 2)).all():

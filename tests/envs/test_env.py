@@ -60,6 +60,8 @@ def test_bad_actions(env):
         env.step(np.zeros(3))
     action = np.zeros(29)
     action[4] = np.nan
+    with pytest.raises(InvalidDataError, match="action must be real numbers; got dict"):
+        env.step({"left_knee": 0.1})
     with pytest.raises(InvalidDataError, match=r"action\[4\] must be finite; got nan"):
         env.step(action)
     assert np.isfinite(env.step(np.zeros(29))[0]).all()

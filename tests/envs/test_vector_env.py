@@ -420,6 +420,14 @@ def test_bad_options(reference):
         make(num_threads=-1)
     with pytest.raises(InvalidOptionError, match="max_episode_steps"):
         make(max_episode_steps=0)
+    for name in ("num_threads", "max_episode_steps", "width", "height"):
+        for value in (1.5, "2", True):
+            with pytest.raises(InvalidOptionError, match=f"{name} must be a whole number; got"):
+                make(**{name: value})
+    with pytest.raises(InvalidOptionError, match=r"num_envs must be a whole number; got 1\.5"):
+        OmniVectorEnv(1.5, reference=reference)
+    with pytest.raises(InvalidOptionError, match="width must be at least 1; got 0"):
+        make(width=0)
     with pytest.raises(InvalidDataError, match="fps"):
         make(physics={"substeps": 5})
     with pytest.raises(InvalidOptionError, match="reference: expected a path"):
@@ -435,6 +443,27 @@ def test_bad_actions(make):
     env.reset()
     with pytest.raises(InvalidDataError, match=r"actions must be \(4, 29\); got \(4, 28\)"):
         env.step(np.zeros((4, 28)))
+    with pytest.raises(InvalidDataError, match="actions must be real numbers; got str"):
+        env.step("stand up")
+
+
+def test_bad_resets(make):
+    env = make()
+    for seed in (-1, [1, 2], [0.5] * 4, "zero"):
+        with pytest.raises(InvalidOptionError, match="one for each of the 4 simulations; got"):
+            env.reset(seed=seed)
+    with pytest.raises(InvalidOptionError, match="options must be a mapping or None; got 5"):
+        env.reset(options=5)
+    with pytest.raises(InvalidOptionError, match=r"frame must be one for all, .* got shape \(2,\)"):
+        env.reset(options={"frame": [1, 2]})
+
+
+def test_a_list_of_no_seeds_goes_on_with_the_chance_there_is(make):
+    env = make()
+    frames = [env.reset(seed=[None] * 4)[1]["frame"].tolist() for _ in range(4)]
+    assert len({tuple(f) for f in frames}) > 1
+    again = [env.reset(seed=[1, None, 2, 3])[0] for _ in range(2)]
+    np.testing.assert_array_equal(*again)
 
 
 def test_picture_with_ghost(make, quiet):
