@@ -120,34 +120,41 @@ def _entries(path: Path, place: str, source: Any, robots: tuple[str, ...]) -> li
         if len(files) > 1:
             found = f"{len(files)} files"
             raise FileFormatError(path, f"{place}.name", "given for a single file", found)
-        files = {file: name for file in files}
-    return [SourceEntry(file, robots, options, variations, n) for file, n in files.items()]
+        files = [(files[0][0], name)]
+    return [SourceEntry(file, robots, options, variations, called) for file, called in files]
 
 
-def _files(path: Path, place: str, pattern: Any) -> dict[str, str | None]:
+def _files(path: Path, place: str, pattern: Any) -> list[tuple[str, str | None]]:
     """Files that a pattern finds, and their names where they are not called after themselves."""
     if not isinstance(pattern, str):
         raise FileFormatError(path, place, "a name, file or glob", shown(pattern))
     if pattern in builtin_names():
-        return {pattern: None}
-    found: dict[str, str | None] = {}
+        return [(pattern, None)]
+    found: list[tuple[str, str | None]] = []
     try:
         wanted = path.parent.resolve() / Path(pattern).expanduser()
         if wanted.is_file():  # whatever brackets its name has
-            return {str(wanted.resolve()): None}
+            return [_file(wanted, (wanted.stem,))]
         root = Path(wanted.anchor)
         inner = wanted.relative_to(root)
         first = next((i for i, part in enumerate(inner.parts) if _WILD.search(part)), None)
-        for file in sorted(root.glob(str(inner))) if first is not None else ():
-            if file.is_file():
-                parts = file.relative_to(root).with_suffix("").parts[first:]
-                found[str(file.resolve())] = "_".join(parts) if len(parts) > 1 else None
+        found += [
+            _file(file, file.relative_to(root).with_suffix("").parts[first:])
+            for file in (sorted(root.glob(str(inner))) if first is not None else ())
+            if file.is_file()
+        ]
     except (ValueError, NotImplementedError, OSError, RuntimeError):  # no pattern at all
         pass
     if not found:
         valid = f"a file beside the recipe, or one of {', '.join(builtin_names())}"
         raise FileFormatError(path, place, valid, repr(pattern))
     return found
+
+
+def _file(file: Path, parts: tuple[str, ...]) -> tuple[str, str | None]:
+    """Where a file is, past links, beside its meshes; and its name, where that is not its own."""
+    there, name = file.resolve(), "_".join(parts)
+    return str(there), None if name == there.stem else name
 
 
 def _options(path: Path, place: str, given: Any) -> dict[str, Any]:

@@ -141,6 +141,13 @@ def test_sources_are_told_apart(tmp_path):
     assert [e.name for e in entries] == names
     assert entries[0].options == {"skeleton": str(tmp_path / "map.yaml")}
     assert entries[2].options == {"skeleton": "lafan1"}
+    (tmp_path / "links").mkdir()
+    (tmp_path / "links/one.bvh").symlink_to(tmp_path / "S1/walk.bvh")
+    (tmp_path / "links/walk.bvh").symlink_to(tmp_path / "S1/walk.bvh")
+    linked = [{"demonstration": "links/*.bvh"}, {"demonstration": "links/one.bvh"}]
+    entries = read_recipe(write(tmp_path, MINIMAL | {"sources": linked})).sources
+    assert [e.name for e in entries] == ["one", None, "one"]
+    assert {e.demonstration for e in entries} == {str(tmp_path / "S1/walk.bvh")}
     several = {"demonstration": "*/walk.bvh", "name": "one"}
     with pytest.raises(FileFormatError, match="name: expected given for a single file"):
         read_recipe(write(tmp_path, MINIMAL | {"sources": [several]}))
