@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -31,6 +32,7 @@ from omni_envs.scenes import Part, Scene, Terrain, load_convex_parts
 
 _SHORTEST_BONE = 0.02  # of a leg; keypoints of one limb that are closer are one point
 _MAX_HEIGHT = 3.0
+_MISFIT = 1.3  # heights that differ by more from what the legs say are no human ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +144,15 @@ def find_conventions(
             height = estimate_height(leg * metres, upright, crown)
     if not 0 < height < _MAX_HEIGHT:
         raise FileFormatError(path, "height", f"0 to {_MAX_HEIGHT:g} m", f"{height:.3g} m")
+    usual = estimate_height(leg * metres)
+    if not usual / _MISFIT < height < usual * _MISFIT:
+        warnings.warn(
+            f"{path}: a height of {height:.3g} m does not fit thighs and shins of "
+            f"{leg * metres:.3g} m, as people of {usual:.3g} m have them. The motion is scaled by "
+            "the height: a robot that it makes too small squats, one too large stretches. Give the "
+            "height (--height) where the source is wrong about it.",
+            stacklevel=3,
+        )
     return Conventions(axis, unit, recording.fps, height)
 
 

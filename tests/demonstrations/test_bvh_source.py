@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 import trimesh
@@ -188,6 +190,16 @@ def test_inhuman_files(person, write_bvh, how, match):
     with pytest.raises(FileFormatError, match=match) as error:
         load_demonstration(path)
     assert str(path) in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_height_that_does_not_fit_the_legs_is_told(person, write_bvh):
+    path = write_bvh(person())
+    with pytest.warns(UserWarning, match=r"clip\.bvh: a height of 2\.6 m does not fit thighs"):
+        assert load_demonstration(path, height=2.6).height == 2.6
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        usual = load_demonstration(path).height
+        load_demonstration(path, height=1.2 * usual)
 
 
 @pytest.mark.parametrize(("frame_time", "fps"), [("8.3333", "0.12"), ("0.0001", "10000")])
