@@ -29,14 +29,16 @@ from omni_envs.demonstrations.builtin.motion import (
 )
 
 # Lengths in m, angles in rad.
-_CARRY_AHEAD, _CARRY_HEIGHT = 0.385, 0.88  # box centre from the centre of mass, and over ground
-_GRIP_UP = 0.12  # palms over the box centre
+_CARRY_AHEAD, _CARRY_HEIGHT = 0.345, 0.88  # box centre from the centre of mass, and over ground
+# Palms over the box centre, and ahead of it: a box whose load lies elsewhere than in the middle tips
+# towards the body, which holds it, and not over its far edge when it is put down.
+_GRIP_UP, _GRIP_AHEAD = 0.12, 0.08
 # The hands come down wide of the box and close on it from the sides: whoever copies this with a box
 # that is somewhat wider, or stands somewhat beside its place, does not land on top of it.
 _OPEN, _ABOVE = 0.15, 0.2  # beside the faces, and above the grip, before they come down; m
 _GRIP_DOWN = np.deg2rad(32.0)  # fingers below the horizontal while gripping
 _STAND, _WALK, _SQUAT = 0.920, 0.907, 0.545  # pelvis heights
-_LEAN = np.deg2rad(56.0)  # of the chest at the bottom of the squat
+_LEAN = np.deg2rad(60.0)  # of the chest at the bottom of the squat
 _CLEARANCE = 0.075  # of a swinging foot
 _COM_HEIGHT = 0.93
 
@@ -169,7 +171,7 @@ def _hands(
         grip_fingers = crate @ np.array([np.cos(_GRIP_DOWN), 0.0, -np.sin(_GRIP_DOWN)])
         inward = crate @ np.array([0.0, -sign, 0.0])
         gap = 0.5 * BOX_SIZE[1] + _OPEN * (1 - close)
-        palm = box - gap[:, None] * inward
+        palm = box - gap[:, None] * inward + _GRIP_AHEAD * crate @ np.array([1.0, 0.0, 0.0])
         palm[:, 2] += _GRIP_UP + above
         gripping = palm - human.PALM * grip_fingers - human.PALM_DEPTH * inward
         w = reach[:, None]

@@ -21,7 +21,7 @@ TURN = np.deg2rad(25.0)
 HALF_STANCE = 0.095
 """Half the distance between the feet, m."""
 
-_REACH = 0.455  # box centre ahead of the ankles when it stands on the ground, m
+_REACH = 0.43  # box centre ahead of the ankles when it stands on the ground, m
 
 
 @dataclass(frozen=True)
