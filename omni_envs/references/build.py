@@ -33,6 +33,9 @@ STANCE = "default"
 # How deep (m) a variation may put the object into the ground, and into the nominal robot.
 _START_DEPTH, _START_OVERLAP = 2e-3, 0.05
 
+_START_LEFT = 5e-3
+"""How deep (m) the robot of a variation may be in its surroundings on the first frame made."""
+
 
 def make_reference(
     demonstration: Demonstration,
@@ -61,7 +64,8 @@ def make_reference(
     Raises:
         UnknownNameError: No such robot.
         InvalidDataError: The rate is not 1 to 1000, the demonstration cannot be used, or the
-            variation puts the object into the robot or the ground at the start.
+            variation puts object or terrain into the robot, or the object into the ground, at the
+            start.
         InvalidOptionError: The variation changes what the scene lacks.
     """
     robot, options = get_robot(robot), options or RetargetOptions()
@@ -100,6 +104,8 @@ def make_reference(
         motion.source,
         relaxed=motion.frames.relaxed,
     )
+    if varied:
+        _check_start(source, report)
     _warn_of_misses(source, robot, report)
     return reference_from_qpos(
         robot,
@@ -192,6 +198,18 @@ def _check_robot(robot: Robot, varied: SourceMotion, qpos: np.ndarray) -> None:
             "object",
             "outside of the robot at the start",
             f"{100 * depth[deepest]:.1f} cm in {start.body_names[start.body[deepest]]}",
+        )
+
+
+def _check_start(varied: SourceMotion, report: ReferenceReport) -> None:
+    """Refuses a variation that leaves the robot no place to start: a terrain that grew over it."""
+    depth = float(report.surroundings_penetration[0])
+    if depth > _START_LEFT:
+        raise InvalidDataError(
+            f"Variation {varied.name!r}",
+            "scene",
+            "one in which the robot can start outside of object, terrain and ground",
+            f"{100 * depth:.1f} cm in it",
         )
 
 

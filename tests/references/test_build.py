@@ -5,7 +5,7 @@ import pytest
 
 from omni_envs.demonstrations import Variation, builtin_demonstration
 from omni_envs.errors import InvalidDataError, UnknownNameError
-from omni_envs.references import Reference, evaluate_reference, make_reference
+from omni_envs.references import Reference, build, evaluate_reference, make_reference
 from omni_envs.references.key import reference_key
 from omni_envs.retargeting import RetargetOptions
 from omni_envs.robots import G1
@@ -139,6 +139,21 @@ def test_a_variation_inside_of_the_robot_is_refused(whole):
             variation=Variation(object_translation=(-reach, 0.0), object_scale=(1.0, 1.0, 3.0)),
             nominal=whole,
         )
+
+
+def test_a_variation_that_leaves_no_place_to_start_is_refused(
+    demonstration, reference, monkeypatch
+):
+    """As where terrain grew over someone who leans on it: solved as well as could be, but deep."""
+    lowered = reference.qpos.copy()
+    lowered[:, 2] -= 0.05
+    deep = evaluate_reference(replace(reference, qpos=lowered))
+    monkeypatch.setattr(build, "evaluate", lambda *_, **__: deep)
+    turned = Variation(object_yaw=0.1)
+    with pytest.raises(InvalidDataError, match=r"turn.*can start outside .*; got 5\.\d cm in it"):
+        make_reference(demonstration, "g1", variation=turned, nominal=reference)
+    # A nominal reference is what the demonstration asks for: its report tells.
+    assert make_reference(demonstration, "g1").report is deep
 
 
 def test_jumps_of_the_recording_are_told(demonstration):
