@@ -10,7 +10,12 @@ import numpy as np
 from omni_envs.demonstrations.contact import object_contacts, terrain_contacts
 from omni_envs.demonstrations.demonstration import Demonstration
 from omni_envs.demonstrations.footing import knee_floor
-from omni_envs.demonstrations.stance import STANCE_MODES, pivot_schedule, stance_schedule
+from omni_envs.demonstrations.stance import (
+    STANCE_MODES,
+    lying_feet,
+    pivot_schedule,
+    stance_schedule,
+)
 from omni_envs.errors import InvalidOptionError
 from omni_envs.robots import KEYPOINTS, SIDES
 from omni_envs.scenes import Scene
@@ -126,8 +131,12 @@ def scale_demonstration(demonstration: Demonstration, robot_height: float) -> So
     else:
         positions = scale * (demonstration.positions - offset)
         contacts, points = terrain_contacts(demonstration, positions, terrain, scale)
+    ankles = [KEYPOINTS.index("left_ankle"), KEYPOINTS.index("right_ankle")]
+    feet = keypoints[:, ankles] - keypoints[:, toes]
+    lying = np.column_stack([lying_feet(feet[:, side]) for side in range(2)])
     stance: dict[str, np.ndarray] = {
-        mode: np.column_stack(
+        mode: ~lying
+        & np.column_stack(
             [stance_schedule(keypoints[:, toe], demonstration.fps, mode) for toe in toes]
         )
         for mode in STANCE_MODES

@@ -28,6 +28,23 @@ _BEGIN_SPEED, _END_SPEED, _MIN_FRAMES = 0.10, 0.15, 3
 _PIVOT, _KEPT, _REST = np.deg2rad(15.0), np.deg2rad(5.0), 0.5
 
 
+# A foot whose toes point further up than this (rad over the horizontal) lies on its heel.
+_TOES_UP = np.deg2rad(40.0)
+
+
+def lying_feet(directions: np.ndarray) -> np.ndarray:
+    """Returns when a foot lies on its heel: its sole does not face the ground, so it cannot stand.
+
+    Args:
+        directions: (T, 3) vectors from toe to ankle.
+
+    Returns:
+        (T,) bool.
+    """
+    level = np.linalg.norm(directions[:, :2], axis=1)
+    return np.arctan2(-directions[:, 2], level) > _TOES_UP
+
+
 def toe_speeds(toe_positions: np.ndarray, fps: float) -> np.ndarray:
     """Horizontal speed (T,) of a toe path (T, 3), m/s; infinite on frame 0, which has no step."""
     steps = np.linalg.norm(np.diff(toe_positions[:, :2], axis=0), axis=1)

@@ -46,6 +46,7 @@ BARS = (
     Bar("slip, code stance, cm/s", "slip_max_code_m_s", 0.10, 100.0),
     Bar("stance drift, sole centre, mm", "stance_still_drift_max_m", 2e-3, 1e3),
     Bar("stance drift, pivot, mm", "stance_pivot_drift_max_m", 2e-3, 1e3),
+    Bar("clearance of flat soles, mm", "stance_clearance_max_m", 0.01, 1e3),
     Bar("joint limits exceeded, rad", "joint_violation_max_rad", _EXACT),
     Bar("speed limits exceeded, rad/s", "velocity_violation_max_rad_s", _EXACT),
     Bar("contact, clean, %", "contact_clean_fraction", 0.98, 100.0, least=True),

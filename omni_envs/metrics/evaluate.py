@@ -8,6 +8,7 @@ import numpy as np
 
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.errors import InvalidDataError
+from omni_envs.metrics.clearance import sole_clearance, stance_clearance
 from omni_envs.metrics.contact import contact_gaps, contact_surfaces, link_distance
 from omni_envs.metrics.joints import (
     joint_acceleration,
@@ -21,6 +22,7 @@ from omni_envs.metrics.playback import TARGETS, Playback, play
 from omni_envs.metrics.report import ReferenceReport
 from omni_envs.metrics.skating import counted_stance, slip_speed, stance_drift, support_normals
 from omni_envs.retargeting import InteractionMesh
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.robots import Robot
 from omni_envs.scenes import Scene
 
@@ -95,6 +97,8 @@ def _follow(
         mode: stance_drift(soles, normals, flags, source.pivots(flags))
         for mode, flags in source.stance.items()
     }
+    clearance = sole_clearance(playback, normals)
+    flat = {mode: HumanFeet.of(source, flags) for mode, flags in source.stance.items()}
     links = tuple(source.contacts)
     keypoints = playback.keypoints()
     error = np.linalg.norm(keypoints - source.keypoints, axis=-1).mean(axis=1)
@@ -106,6 +110,10 @@ def _follow(
         drift={mode: centre for mode, (centre, _, _) in drift.items()},
         still_drift={mode: still for mode, (_, still, _) in drift.items()},
         pivot_drift={mode: pivot for mode, (_, _, pivot) in drift.items()},
+        clearance={
+            mode: stance_clearance(clearance, human.flat & ~human.pivots, playback.fps)
+            for mode, human in flat.items()
+        },
         contact={link: np.asarray(source.contacts[link], bool) for link in links},
         contact_distance={k: link_distance(playback, k, contact_surfaces(scene, k)) for k in links},
         contact_depth={k: np.maximum(0.0, -link_distance(playback, k, TARGETS)) for k in links},

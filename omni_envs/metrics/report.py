@@ -47,6 +47,9 @@ class ReferenceReport:
             toes within the stance, NaN while it does: see ``stance_drift``.
         pivot_drift: Mode to (T, 2) the same of the sole point that moved least: what is left when
             rolling over heel or toe is not called drift.
+        clearance: Mode to (T, 2) height of the farthest sole point over what is below the foot,
+            median of the frames in a row on which the human stands flat, m; NaN on others: see
+            ``stance_clearance``.
         contact: Link to (T,) bool: the source touches object or terrain.
         contact_distance: Link to (T,) signed distance of the link to that surface, m, infinite
             beyond reach.
@@ -70,6 +73,7 @@ class ReferenceReport:
     drift: Mapping[str, np.ndarray] = field(default_factory=dict)
     still_drift: Mapping[str, np.ndarray] = field(default_factory=dict)
     pivot_drift: Mapping[str, np.ndarray] = field(default_factory=dict)
+    clearance: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_distance: Mapping[str, np.ndarray] = field(default_factory=dict)
     contact_depth: Mapping[str, np.ndarray] = field(default_factory=dict)

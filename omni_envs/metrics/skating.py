@@ -12,7 +12,7 @@ from omni_envs.scenes import GROUND, TERRAIN
 
 # A foot closer than this (m) to ground or terrain has that surface's normal; steeper ones are
 # walls.
-_SUPPORT_DISTANCE, _SUPPORT_SLOPE = 0.02, 0.5
+_SUPPORT_DISTANCE, SUPPORT_SLOPE = 0.02, 0.5
 
 
 def support_normals(playback: Playback) -> np.ndarray:
@@ -25,7 +25,7 @@ def support_normals(playback: Playback) -> np.ndarray:
     normals[..., 2] = 1.0
     ground = np.isin(playback.target, [TARGETS.index(GROUND), TARGETS.index(TERRAIN)])
     near = ground & (playback.distance <= _SUPPORT_DISTANCE)
-    near &= playback.normal[:, 2] > _SUPPORT_SLOPE
+    near &= playback.normal[:, 2] > SUPPORT_SLOPE
     for side, name in enumerate(SIDES):
         pairs = np.flatnonzero(near & playback.bodies((playback.robot.feet[name].body,)))
         # Ascending slope: the flattest contact of a frame is written last.

@@ -32,6 +32,8 @@ def summarize(report: ReferenceReport) -> Figures:
     - ``stance_drift_max_m``: of the sole centre, in the ``default`` set, rolling counted;
       ``stance_still_drift_max_m``: the same where the human's foot neither rolls nor turns;
       ``stance_pivot_drift_max_m``: of the sole point that moved least, so without rolling.
+    - ``stance_clearance_max_m``: how far the farthest sole point is off the support, of the worst
+      stance in which the human stands on the whole sole (``default`` set).
     - ``contact_fraction_2cm``: share of (link, frame) that the human touches with and the robot is
       within 2 cm; ``contact_clean_fraction``: and the link is at most 1 cm deep.
     - ``energy_*``: deformation energy, weight 1, m².
@@ -50,6 +52,7 @@ def summarize(report: ReferenceReport) -> Figures:
         "stance_drift_max_m": _max(report.drift.get("default")),
         "stance_still_drift_max_m": _max(report.still_drift.get("default")),
         "stance_pivot_drift_max_m": _max(report.pivot_drift.get("default")),
+        "stance_clearance_max_m": _max(report.clearance.get("default")),
         "self_penetration_max_m": float(report.penetration[SELF].max()),
         "joint_violation_max_rad": float(report.joint_violation.max()),
         "velocity_violation_max_rad_s": float(report.velocity_violation.max()),
@@ -88,6 +91,7 @@ def details(report: ReferenceReport) -> Figures:
         figures[f"stance_drift_max_{mode}_m"] = _max(report.drift[mode])
         figures[f"stance_still_drift_max_{mode}_m"] = _max(report.still_drift.get(mode))
         figures[f"stance_pivot_drift_max_{mode}_m"] = _max(report.pivot_drift[mode])
+        figures[f"stance_clearance_max_{mode}_m"] = _max(report.clearance.get(mode))
     for centimetres in (1, 2, 5):
         near = 0.01 * centimetres
         if near != TOUCHING:  # that one is in the summary

@@ -9,7 +9,8 @@ from omni_envs.references import Reference
 KEYS = {
     "frames", "fps", "penetration_max_m", "penetration_fraction_1mm", "slip_fraction_text",
     "slip_fraction_default", "slip_max_code_m_s", "stance_drift_max_m",
-    "stance_still_drift_max_m", "stance_pivot_drift_max_m", "self_penetration_max_m",
+    "stance_still_drift_max_m", "stance_pivot_drift_max_m", "stance_clearance_max_m",
+    "self_penetration_max_m",
     "joint_violation_max_rad", "velocity_violation_max_rad_s", "contact_fraction_2cm",
     "contact_clean_fraction", "contact_point_gap_mean_m", "energy_mean", "energy_max",
     "joint_acceleration_rms", "relaxed_frames",

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omni_envs.demonstrations import stance_intervals, stance_schedule
-from omni_envs.demonstrations.stance import pivot_schedule
+from omni_envs.demonstrations.stance import lying_feet, pivot_schedule
 from omni_envs.errors import InvalidDataError, UnknownNameError
 
 FPS = 30.0
@@ -75,3 +75,9 @@ def test_bad_input():
         stance_schedule(toe([0.0]), FPS, "defalt")
     with pytest.raises(InvalidDataError, match="toe_positions"):
         stance_schedule(np.zeros((4, 2)), FPS)
+
+
+def test_a_foot_on_its_heel_lies():
+    angles = np.deg2rad([-60.0, 0.0, 20.0, 39.0, 41.0, 90.0])  # of the toes over the ankle
+    directions = -np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
+    np.testing.assert_array_equal(lying_feet(directions), [False] * 4 + [True] * 2)

@@ -20,6 +20,7 @@ KEYS = [
     "stance_drift_max_m",
     "stance_still_drift_max_m",
     "stance_pivot_drift_max_m",
+    "stance_clearance_max_m",
     "self_penetration_max_m",
     "joint_violation_max_rad",
     "velocity_violation_max_rad_s",

@@ -50,3 +50,35 @@ def test_feet_of_a_source(climber):
     np.testing.assert_allclose(feet.axes[:2, 0], np.tile(np.eye(3)[:2], (2, 1, 1)))
     np.testing.assert_allclose(feet.rise[2:8, 0], [0, 0.01, 0.02, 0, 0, 0], atol=1e-9)
     assert not feet.rise[:, 1].any() and not feet.pivots.any()
+
+
+def test_flat_is_who_stands_on_the_whole_sole_of_something(climber):
+    standing = np.zeros((10, 2), bool)
+    standing[2:8, 0] = True
+    toe, ankle, knee = (
+        climber.keypoints[:, KEYPOINTS.index(f"left_{joint}")].copy()
+        for joint in ("toe", "ankle", "knee")
+    )
+    toe[:] = toe[2]
+    along = np.array([np.cos(ANGLE), 0.0, np.sin(ANGLE)])
+    ankle[:] = toe - 0.12 * along + 0.05 * UPHILL
+    ankle[4] = toe[4] - 0.08 * along + 0.10 * UPHILL  # the heel is up
+    knee[:] = ankle + 0.4 * UPHILL
+    knee[6] = ankle[6] - 0.4 * along  # kneeling: the foot lies
+    keypoints = climber.keypoints.copy()
+    for joint, path in (("toe", toe), ("ankle", ankle), ("knee", knee)):
+        keypoints[:, KEYPOINTS.index(f"left_{joint}")] = path
+    feet = HumanFeet.of(replace(climber, keypoints=keypoints), standing)
+    expected = np.isin(np.arange(10), [2, 3, 5, 7])
+    np.testing.assert_array_equal(feet.flat[:, 0], expected)
+    assert not feet.flat[:, 1].any()
+    np.testing.assert_allclose(feet.support[2:8, 0], toe[2] @ UPHILL, atol=1e-6)
+    assert np.isinf(feet.support[:2, 0]).all()
+
+
+def test_a_foot_on_nothing_has_no_support(climber):
+    keypoints = climber.keypoints.copy()
+    keypoints[:, KEYPOINTS.index("left_toe"), 2] += 0.2
+    standing = np.ones((10, 2), bool)
+    feet = HumanFeet.of(replace(climber, keypoints=keypoints), standing)
+    assert np.isinf(feet.support[:, 0]).all() and not feet.flat[:, 0].any()

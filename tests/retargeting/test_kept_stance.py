@@ -40,7 +40,9 @@ def human(frames=10, pivots=slice(0, 0), slope=0.0):
     flags = np.zeros((frames, 2), bool)
     flags[pivots] = True
     axes = np.array([[np.cos(slope), 0.0, np.sin(slope)], [0.0, 1.0, 0.0]])
-    return HumanFeet(flags, np.zeros((frames, 2)), np.tile(axes, (frames, 2, 1, 1)))
+    axes = np.tile(axes, (frames, 2, 1, 1))
+    on_ground = np.zeros((frames, 2))
+    return HumanFeet(flags, on_ground, axes, on_ground, on_ground > 0)
 
 
 def inside(windows, feet, t):

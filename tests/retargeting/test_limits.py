@@ -96,6 +96,8 @@ def stand(configuration, frames=6, pivots=False, rise=0.0, slope=0.0, reach=0.0)
         np.full((frames, 2), pivots),
         np.full((frames, 2), rise),
         np.tile(axes, (frames, 2, 1, 1)),
+        np.full((frames, 2), np.inf),
+        np.zeros((frames, 2), bool),
     )
     return StanceLimit(plan_stance(tier, wishes, human, 30.0, options), options)
 
@@ -148,7 +150,8 @@ def test_the_way_to_a_foothold_is_no_constraint(configuration):
     tips = np.repeat(configuration.feet()[None, :, 0, :2], frames, axis=0) + 0.02
     flat = np.zeros((frames, 2))
     wishes = FootWishes(tips, flat, flat - 0.1, flat + 1.0, np.full(2, 0.1))
-    human = HumanFeet(flat > 0, flat, np.tile(np.eye(3)[:2], (frames, 2, 1, 1)))
+    axes = np.tile(np.eye(3)[:2], (frames, 2, 1, 1))
+    human = HumanFeet(flat > 0, flat, axes, flat + np.inf, flat > 0)
     tier = np.full((frames, 2), ANCHORED)
     tier[:3] = FREE
     limit = StanceLimit(plan_stance(tier, wishes, human, 30.0, options), options)

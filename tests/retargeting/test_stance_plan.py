@@ -31,7 +31,8 @@ def human(frames, pivots=slice(0, 0)):
     flags = np.zeros((frames, 2), bool)
     flags[pivots] = True
     axes = np.tile(np.eye(3)[:2], (frames, 2, 1, 1))
-    return HumanFeet(flags, np.zeros((frames, 2)), axes)
+    support, flat = np.full((frames, 2), np.inf), np.zeros((frames, 2), bool)
+    return HumanFeet(flags, np.zeros((frames, 2)), axes, support, flat)
 
 
 def plan_of(tier, wished, pivots=slice(0, 0)):
