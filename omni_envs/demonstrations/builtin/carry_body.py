@@ -30,8 +30,8 @@ from omni_envs.demonstrations.builtin.motion import (
 
 # Lengths in m, angles in rad.
 _CARRY_AHEAD, _CARRY_HEIGHT = 0.345, 0.88  # box centre from the centre of mass, and over ground
-# Palms over the box centre, and ahead of it: a box whose load lies elsewhere than in the middle tips
-# towards the body, which holds it, and not over its far edge when it is put down.
+# Palms over the box centre, and ahead of it: a box whose load is not in its middle tips towards the
+# body, which holds it, and not over its far edge when it is put down.
 _GRIP_UP, _GRIP_AHEAD = 0.12, 0.08
 # The hands come down wide of the box and close on it from the sides: whoever copies this with a box
 # that is somewhat wider, or stands somewhat beside its place, does not land on top of it.
