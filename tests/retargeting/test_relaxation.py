@@ -30,7 +30,7 @@ def standing(source, poses):
 @pytest.fixture(scope="module")
 def swaying(grasp):
     poses = grasp.object_poses.copy()
-    poses[:, 0] += 0.3 * np.sin(2 * np.pi * np.arange(len(poses)) / 20)
+    poses[:, 0] += 0.4 * np.sin(2 * np.pi * np.arange(len(poses)) / 20)
     return standing(grasp, poses)
 
 

@@ -126,6 +126,7 @@ OTHER = PPOConfig(
     max_grad_norm=0.1,
     hidden=(24,),
     initial_std=0.3,
+    average_updates=4,
 )
 """Another value of every hyper-parameter: one that a trainer does not heed shows."""
 
