@@ -68,14 +68,9 @@ class PPOConfig:
     average_updates: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("rollout_steps", "epochs", "minibatches"):
-            within(
-                "PPOConfig", name, getattr(self, name), "a whole number from 1 on", 1, whole=True
-            )
-        within(
-            "PPOConfig", "average_updates", self.average_updates, "a whole number from 0 on", 0,
-            whole=True,
-        )  # fmt: skip
+        for name, least in _WHOLE.items():
+            expected = f"a whole number from {least} on"
+            within("PPOConfig", name, getattr(self, name), expected, least, whole=True)
         for name in ("learning_rate", "initial_std", "clip", "max_grad_norm"):
             positive("PPOConfig", name, getattr(self, name))
         for name in _FROM_ZERO:
@@ -217,6 +212,7 @@ class TrainConfig:
             raise FileFormatError(path, "content", "a TrainConfig as JSON", str(error)) from error
 
 
+_WHOLE = {"rollout_steps": 1, "epochs": 1, "minibatches": 1, "average_updates": 0}
 _FROM_ZERO = (
     "critic_learning_rate", "desired_kl", "value_clip", "value_weight", "entropy_weight",
 )  # fmt: skip
