@@ -14,8 +14,8 @@ from scipy.linalg import solve_discrete_are
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from omni_envs.robots import Robot
-from omni_envs.scenes import PhysicsOptions, Scene, build_spec
+from omni_envs.robots import SIDES, Robot
+from omni_envs.scenes import PhysicsOptions, Scene, SceneObject, build_spec
 
 SUBSTEPS = 4  # physics steps per control step
 
@@ -261,6 +261,25 @@ def hull_extent() -> Callable[[Robot, str], tuple[np.ndarray, np.ndarray]]:
         return extent(robot.model, geoms_of(robot.model, body, (3, 4)))
 
     return measure
+
+
+@pytest.fixture
+def check_rubber() -> Callable[[Robot, set[str]], None]:
+    """The given geoms, left and right, and no others resist a twist as a patch of rubber does."""
+
+    def check(robot: Robot, parts: set[str]) -> None:
+        # A disc of radius r under even pressure slides in rotation at 2/3 μ r per newton.
+        patch = 2 / 3 * SceneObject.friction * 0.03
+        rubber = set()
+        for physics in BUILDS.values():
+            built = build_spec(robot, Scene(), physics, looks=False).compile()
+            soft = built.geom_condim[1:] == 4
+            assert built.geom_friction[1:, 1] == pytest.approx(np.where(soft, patch, 0.005))
+            assert np.all(built.geom_friction[1:, 0] == 0.6)
+            rubber |= {built.geom(g + 1).name for g in np.flatnonzero(soft)}
+        assert rubber == {f"{side}_{part}" for side in SIDES for part in parts}
+
+    return check
 
 
 @pytest.fixture

@@ -253,6 +253,11 @@ def test_every_limb_carries_friction(build: str) -> None:
     assert model.ngeom < {"kinematics": 65, "physics": 45}[build]
 
 
+def test_rubber_hands_resist_a_twist(check_rubber: Callable[[Robot, set[str]], None]) -> None:
+    parts = {"palm_hull", "knuckle_hull", "palm_0", "palm_1", "finger_hull", "thumb_hull"}
+    check_rubber(G1, parts)
+
+
 def test_soles_are_flat_and_touch_the_ground() -> None:
     data = mujoco.MjData(G1.model)
     data.qpos[:] = G1.default_qpos

@@ -138,6 +138,10 @@ def test_geoms(check_geoms: Callable[[Robot, set[str]], None]) -> None:
     check_geoms(T1, {"Trunk", "Waist", "H2", *limbs, *ends})
 
 
+def test_rubber_hands_resist_a_twist(check_rubber: Callable[[Robot, set[str]], None]) -> None:
+    check_rubber(T1, {"hand_hull"})
+
+
 def test_soles_are_flat_and_touch_the_ground(check_soles: Callable[[Robot], None]) -> None:
     check_soles(T1)
 
