@@ -26,6 +26,7 @@ from omni_envs.retargeting.nominal_task import nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.qp import step_rows
+from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.stance_plan import ANCHORED, stance_tiers
 from omni_envs.retargeting.tasks import Quadratic
 from omni_envs.robots import KEYPOINTS, Robot
@@ -123,6 +124,7 @@ class ClipProgram:
         feet = self._trace(qpos, 0, len(qpos)).positions[:, _K:].reshape(-1, 2, 2, 3)
         tiers = stance_tiers(source, options.stance)
         human = HumanFeet.of(source, tiers == ANCHORED)
+        self._soles = SoleTask(human, source.fps, options.sole_weight)
         self.windows = stance_windows(feet, tiers, human, source.fps, options.stance)
         self.stance = KeptStance(self.windows, self.configuration)
 
@@ -163,6 +165,8 @@ class ClipProgram:
             contacts.append(step_rows(self.configuration, [self.contact]))
             self._touch.set_frame(t if self._touching else None)
             costs.append((t - start, self._touch.quadratic(self.configuration)))
+            self._soles.set_frame(t)
+            costs.append((t - start, self._soles.quadratic(self.configuration)))
             if self._orientation is not None:
                 self._orientation.set_frame(t)
                 costs.append((t - start, self._orientation.quadratic(self.configuration)))

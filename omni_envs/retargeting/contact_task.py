@@ -9,10 +9,10 @@ from omni_envs import rotations
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.retargeting import kernels
 from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.ramps import ramps
 from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 _NEAR = 0.01  # m
-_RAMP = 0.1  # s over which the pull grows before a contact, and fades after it
 
 
 class ContactTask(CostTask):
@@ -35,7 +35,7 @@ class ContactTask(CostTask):
         places = [np.asarray(source.contact_points[link], float) for link in links]
         touching = np.array([np.isfinite(place).all(axis=1) for place in places])
         touching = touching.reshape(len(links), source.num_frames)
-        self._ramps, nearest = _ramps(touching, round(_RAMP * source.fps))
+        self._ramps, nearest = ramps(touching, source.fps)
         places = [place[near] for place, near in zip(places, nearest, strict=True)]
         if source.object_poses is not None:
             poses = source.object_poses
@@ -67,31 +67,6 @@ class ContactTask(CostTask):
         )
         J = (roots @ np.moveaxis(jacobian, 0, 1)).reshape(gaps.size, -1)
         return Quadratic(*kernels.weighted_squares(J, -gaps.ravel(), self._weight * self._ramp))
-
-
-def _ramps(touching: np.ndarray, frames: int) -> tuple[np.ndarray, np.ndarray]:
-    """Weights in [0, 1], and the frame whose place pulls: no pull is sudden.
-
-    Args:
-        touching: (links, T) bool.
-        frames: Frames over which the pull on a link grows before a contact, and fades after it.
-
-    Returns:
-        (links, T) 1 in contact, falling to 0 around it; and (links, T) the nearest frame in
-        contact, any frame where there is none near.
-    """
-    count = touching.shape[1]
-    t = np.arange(count)
-    ramps, nearest = np.zeros(touching.shape), np.tile(t, (len(touching), 1))
-    for ramp, near, flags in zip(ramps, nearest, touching, strict=True):
-        known = np.flatnonzero(flags)
-        if len(known):
-            after = np.searchsorted(known, t)
-            before = known[np.maximum(after - 1, 0)]
-            after = known[np.minimum(after, len(known) - 1)]
-            near[:] = np.where(np.abs(t - before) <= np.abs(t - after), before, after)
-            ramp[:] = np.maximum(1.0 - np.abs(t - near) / (frames + 1), 0.0)
-    return ramps, nearest
 
 
 class _Link:

@@ -17,7 +17,7 @@ TIP, HEART = 0, 1
 """Held points of a foot: the toe tip, and the heart of the sole, the mean of all other points."""
 
 _FLAT = 5e-3  # m: where the heart of an anchored sole moves less, the foot does not roll
-_LANDING = 5e-4  # m: how far from its window a foot may land
+_LANDING = 2e-3  # m: how far from its window a foot may land
 _RISE = 0.03  # m/s that any planted tip may rise or sink
 _TILT = 2e-3  # m that an anchored tip may rise when its foot tilts about its edge
 _SLID = 3.0  # tolerances: an anchored tip that left its window this far was forced to

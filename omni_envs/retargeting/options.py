@@ -63,6 +63,8 @@ class RetargetOptions:
         smoothness_weight: Weight of the distance to the previous frame (OmniRetarget: 0.2).
         contact_weight: Weight of the distance between a touching link and the point of the surface
             that the human touches, 0 switches it off. Not in the paper.
+        sole_weight: Weight of the distance between a sole and the support that the human has the
+            whole sole on, 0 switches it off. Not in the paper.
         nominal_weight: Weight of base and legs against a nominal motion, where ``retarget`` is
             given one (OmniRetarget: 5).
         nominal_decay: Time in which that weight falls to 1/e, s (OmniRetarget: 10 frames at 30 fps
@@ -96,6 +98,7 @@ class RetargetOptions:
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
     contact_weight: float = 400.0
+    sole_weight: float = 1000.0
     nominal_weight: float = 5.0
     nominal_decay: float | None = 1.0 / 3.0
     orientation_weights: Mapping[str, float] = field(default_factory=dict)

@@ -39,6 +39,7 @@ from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
+from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.retargeting.stance_limit import StanceLimit
 from omni_envs.retargeting.stance_plan import (
@@ -199,6 +200,10 @@ class _Retargeter:
         tasks: list[CostTask] = [self.mesh, self.smoothness, self.posture]
         if options.contact_weight > 0 and source.contact_points:
             tasks.append(self.touch)
+        self.tier = stance_tiers(source, options.stance)
+        self.human_feet = HumanFeet.of(source, self.tier == ANCHORED)
+        self.soles = SoleTask(self.human_feet, source.fps, options.sole_weight)
+        tasks.append(self.soles)
         self.orientation: OrientationTask | None = None
         if options.orientation_weights:
             self.orientation = OrientationTask(
@@ -284,6 +289,7 @@ class _Retargeter:
     def _place(self, t: int) -> None:
         """Sets the scene, the mesh and the nominal pose to frame t."""
         self.mesh.set_frame(t)
+        self.soles.set_frame(t)
         if self.orientation is not None:
             self.orientation.set_frame(t)
         if self.nominal is not None:
@@ -350,7 +356,7 @@ class _Retargeter:
             _interpolate(frames, every, wishes.lying),
             wishes.length,
         )
-        tier = stance_tiers(source, self.options.stance)
+        tier = self.tier
         if self.nominal_motion is not None:
             # The paper's p_0^F = p̄_0^F: feet that stand on frame 0 stand where the nominal ones do.
             self.configuration.update(self.nominal_motion[0])
@@ -361,5 +367,4 @@ class _Retargeter:
             turn = start.headings - wishes.headings[:1]
             same = start.headings - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
             wishes.headings[standing] = np.broadcast_to(same, tier.shape)[standing]
-        feet_of_human = HumanFeet.of(source, tier == ANCHORED)
-        return plan_stance(tier, wishes, feet_of_human, source.fps, self.options.stance), first
+        return plan_stance(tier, wishes, self.human_feet, source.fps, self.options.stance), first

@@ -3,7 +3,11 @@ import pytest
 
 from omni_envs.retargeting import RetargetOptions, deformation_energy, retarget
 from omni_envs.retargeting.clip_program import ClipProgram, motion_steps, moved
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.interior_point import solve_clip_qp
+from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.sole_task import SoleTask
+from omni_envs.retargeting.stance_plan import ANCHORED, stance_tiers
 from omni_envs.robots import G1
 
 OPTIONS = RetargetOptions(contact_weight=0.0)
@@ -35,7 +39,17 @@ def cost(motion, qpos):
         + OPTIONS.smoothness_weight * (metric * steps**2).sum()
         + WEIGHT * (metric * acceleration**2).sum()
         + posture
-    )
+    ) + sum(soles(motion, qpos))
+
+
+def soles(motion, qpos):
+    standing = stance_tiers(motion.source, OPTIONS.stance) == ANCHORED
+    task = SoleTask(HumanFeet.of(motion.source, standing), motion.fps, OPTIONS.sole_weight)
+    configuration = Kinematics(G1, motion.source.scene)
+    for t, q in enumerate(qpos):
+        task.set_frame(t)
+        configuration.update(q)
+        yield task.quadratic(configuration).value
 
 
 def test_steps_and_moves_are_inverse(motion):

@@ -18,7 +18,9 @@ from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.robots import G1
 
 TOLD = 2e-4  # m: what counts as relaxed
-SLOW = RetargetOptions(velocity_limits=0.05)
+# Without the pull on soles: feet that were told to stand where they swing have no support to lie on.
+FULL = RetargetOptions(sole_weight=0.0)
+SLOW = replace(FULL, velocity_limits=0.05)
 
 
 def standing(source, poses):
@@ -45,7 +47,7 @@ def excess(motion, fraction):
     return (speed - fraction * G1.velocity_limits).max(), beyond, report.summary()
 
 
-@pytest.mark.parametrize("options", [RetargetOptions(), SLOW], ids=["full speed", "5 %"])
+@pytest.mark.parametrize("options", [FULL, SLOW], ids=["full speed", "5 %"])
 def test_stance_gives_way_first(swaying, options):
     motion = retarget(swaying, G1, options)
     told = motion.frames.violations

@@ -7,12 +7,14 @@ import pytest
 from omni_envs.retargeting import InteractionMesh
 from omni_envs.retargeting.contact_task import ContactTask
 from omni_envs.retargeting.foothold_task import FootholdTask
+from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.nominal_task import NominalTask, nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
+from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.stance_plan import StancePlan
 from omni_envs.robots import G1
 
@@ -50,6 +52,18 @@ def foothold_task():
     return FootholdTask(plan)
 
 
+def sole_task():
+    up, downhill = np.array([np.sin(0.2), 0.0, np.cos(0.2)]), [np.cos(0.2), 0.0, -np.sin(0.2)]
+    human = HumanFeet(
+        pivots=np.zeros((1, 2), bool),
+        rise=np.zeros((1, 2)),
+        axes=np.array([[[downhill, np.cross(up, downhill)], np.eye(3)[:2]]]),
+        support=np.array([[0.1, 0.05]]),
+        flat=np.ones((1, 2), bool),
+    )
+    return SoleTask(human, 30.0, 20.0)
+
+
 def tasks(grasp, configuration):
     mesh = InteractionMeshTask(InteractionMesh.of(grasp, 40), 10.0)
     mesh.set_frame(50)
@@ -69,11 +83,12 @@ def tasks(grasp, configuration):
         "foothold": foothold_task(),
         "nominal": nominal,
         "orientation": orientation,
+        "sole": sole_task(),
     }
 
 
 @pytest.mark.parametrize(
-    "name", ["mesh", "proximal", "contact", "foothold", "nominal", "orientation"]
+    "name", ["mesh", "proximal", "contact", "foothold", "nominal", "orientation", "sole"]
 )
 def test_model(grasp, configuration, q, name):
     task = tasks(grasp, configuration)[name]
@@ -105,20 +120,6 @@ def test_tasks_that_are_off(grasp, configuration, q):
     for task in (touch, near):
         assert task.quadratic(configuration) is None
         assert not task.compute_qp_objective(configuration).H.any()
-
-
-def test_contact_pull_starts_gently(grasp, configuration):
-    from omni_envs.retargeting.contact_task import _ramps
-
-    flags = np.zeros((3, 25), bool)
-    flags[0, 10:15] = True
-    flags[1] = True
-    ramps, nearest = _ramps(flags, 4)
-    np.testing.assert_allclose(ramps[0, 5:12], [0, 0.2, 0.4, 0.6, 0.8, 1, 1])
-    np.testing.assert_allclose(ramps[0, 13:20], [1, 1, 0.8, 0.6, 0.4, 0.2, 0])
-    # Before a contact the place is the first one touched, after it the last.
-    assert nearest[0, 7] == 10 and nearest[0, 12] == 12 and nearest[0, 17] == 14
-    assert (ramps[1] == 1.0).all() and (ramps[2] == 0.0).all()
 
 
 def test_contact_gap_is_to_the_surface_of_the_link(grasp, configuration, q):
