@@ -184,13 +184,13 @@ def _show_environments(env: str, figures: dict[str, Any]) -> None:
         raw(f"{v['num_envs']} simulations, {v['num_threads']} threads / mujoco.batch", v)
     raw("single environment / mj_step", figures["single"])
     raw("Gymnasium's Humanoid-v5 / mj_step", figures["humanoid"])
-    other = figures["asynchronous"]
-    row(
-        f"vector environment / AsyncVectorEnv, {other['workers']} processes",
-        other["steps_per_s"],
-        other["async_steps_per_s"],
-        other["ratio"],
-    )
+    for other in figures["asynchronous"]:
+        row(
+            f"vector environment / AsyncVectorEnv, {other['workers']} processes",
+            other["steps_per_s"],
+            other["async_steps_per_s"],
+            other["ratio"],
+        )
     console.print(table)
     memory = figures["bytes_per_env"]
     count = figures["vector"][-1]["num_envs"]
