@@ -37,9 +37,9 @@ class StanceOptions:
 
     anchored: StanceMode | None = "default"
     tolerance: float = 1e-4
-    heart_tolerance: float = 1.2e-3
+    heart_tolerance: float = 0.8e-3
     loose: StanceMode | None = "code"
-    loose_speed: float = 0.07
+    loose_speed: float = 0.06
 
     def __post_init__(self) -> None:
         for name in ("anchored", "loose"):
