@@ -28,6 +28,7 @@ def test_the_card_is_about_the_evaluation(folder):
     figures = json.loads((folder / "evaluation.json").read_text())
     card = (folder / CARD).read_text()
     assert figures["episodes"] >= 200 and figures["success_rate"] >= 0.8
+    assert figures["carried_rate"] is None or figures["carried_rate"] >= 0.8
     assert f"**{figures['success_rate']:.1%}**" in card
     assert "python train.py --recipe" in card and "Apache-2.0" in card
     for name in (STRIP, MOTION, "curve.png", "curve.csv", "policy.json"):

@@ -140,6 +140,16 @@ def test_a_policy_below_the_bar_is_not_published(run, tmp_path):
     assert not (tmp_path / "policy").exists()
 
 
+def test_nor_is_one_that_leaves_the_object_where_it_is(run, tmp_path, monkeypatch):
+    from omni_envs.training import evaluate
+
+    found = replace(evaluate_run(run, episodes=2), success_rate=0.9, carried_rate=0.1)
+    monkeypatch.setattr(evaluate, "evaluate_run", lambda *_, **__: found)
+    with pytest.raises(InvalidOptionError, match="object carried of 0.100 is below the 0.800"):
+        publish(run, tmp_path / "policy", episodes=2, least=0.8)
+    assert not (tmp_path / "policy").exists()
+
+
 def test_the_command_publishes(run, tmp_path, capsys):
     out = tmp_path / "policy"
     assert main(["publish", str(run), "--out", str(out), "--episodes", "2", "--json"]) == 0

@@ -25,7 +25,7 @@ class Publish:
     """Randomized episodes of the evaluation."""
 
     least: float = 0.0
-    """Success rate below which nothing is published."""
+    """Success rate, with the object carried where there is one, below which nothing is published."""
 
     json: bool = False
     """Print JSON."""

@@ -39,7 +39,7 @@ class Evaluation:
         success_rate: Share of episodes that hit no termination criterion, under the evaluation
             randomization.
         success_ci95: Its 95 % confidence interval (Wilson).
-        carried_rate: Share of episodes that succeed with the object never further than 0.25 m from
+        carried_rate: Share of episodes that succeed with the object never further than 0.5 m from
             its reference, stricter than the task; None without an object.
         episodes: Number of episodes.
         episode_length_mean: Control steps.
