@@ -25,7 +25,7 @@ class Publish:
     """Randomized episodes of the evaluation."""
 
     least: float = 0.0
-    """Success rate, with the object carried where there is one, below which nothing is published."""
+    """Rate of success, the object carried, below which nothing is published."""
 
     json: bool = False
     """Print JSON."""

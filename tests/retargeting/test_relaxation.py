@@ -18,7 +18,7 @@ from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.robots import G1
 
 TOLD = 2e-4  # m: what counts as relaxed
-# Without the pull on soles: feet that were told to stand where they swing have no support to lie on.
+# Without the pull on soles: feet told to stand where they swing have no support to lie on.
 FULL = RetargetOptions(sole_weight=0.0)
 SLOW = replace(FULL, velocity_limits=0.05)
 
