@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from omni_envs.retargeting import kernels
-from omni_envs.retargeting.kinematics import Kinematics
+from omni_envs.retargeting.feet_task import FeetTask
 from omni_envs.retargeting.stance_plan import StancePlan
-from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 
-class FootholdTask(CostTask):
+class FootholdTask(FeetTask):
     """½ Σ w (arm · forward - planned)²: heading and pitch of a foot that lands or stands.
 
     A cost, not a limit: a foot that cannot turn in time lands as it is, and ``StanceLimit`` keeps
@@ -25,17 +23,6 @@ class FootholdTask(CostTask):
         """Chooses a frame of the plan."""
         plan = self._plan
         foot, arm = np.nonzero(plan.arm_weights[t])
-        self._weights = plan.arm_weights[t][foot, arm]
-        self._targets = plan.arms[t][foot, arm]
-        # Components of ``Kinematics.feet`` that are wished for, as a matrix on all of them.
         select = np.zeros((len(foot), 2, 3, 3))
         select[np.arange(len(foot)), foot, arm + 1, :2] = plan.forward[t][foot]
-        self._select = select.reshape(-1, 18)
-
-    def quadratic(self, configuration: Kinematics) -> Quadratic | None:
-        """Returns the Gauss-Newton model of the cost."""
-        if not len(self._weights):
-            return None
-        arms = self._select @ configuration.feet().ravel()
-        J = self._select @ configuration.feet_jacobians().reshape(18, -1)
-        return Quadratic(*kernels.weighted_squares(J, arms - self._targets, self._weights))
+        self._wish(plan.arm_weights[t][foot, arm], plan.arms[t][foot, arm], select)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from omni_envs.retargeting import kernels
+from omni_envs.retargeting.feet_task import FeetTask
 from omni_envs.retargeting.human_feet import HumanFeet
-from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.ramps import ramps
-from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 
-class SoleTask(CostTask):
+class SoleTask(FeetTask):
     """½ w Σ (n · p - h)² over toe tip and heart of soles: n · p = h is what the human stands on.
 
     And over the arm from the tip to the left, which is to lie in that plane. The interaction mesh
@@ -29,7 +27,7 @@ class SoleTask(CostTask):
         nearest, foot = nearest.T, np.arange(2)
         axes = human.axes[nearest, foot]
         normals = np.cross(axes[..., 0, :], axes[..., 1, :])
-        self._weights = weight * grow.T
+        self._pull = weight * grow.T
         self._heights = np.where(grow.T > 0.0, human.support[nearest, foot], 0.0)
         # Rows on ``Kinematics.feet``: tip, tip + arm to the heart, arm to the left.
         rows = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -38,17 +36,8 @@ class SoleTask(CostTask):
 
     def set_frame(self, t: int) -> None:
         """Chooses the source frame."""
-        feet = np.flatnonzero(self._weights[t])
+        feet = np.flatnonzero(self._pull[t])
         select = np.zeros((len(feet), 3, 2, 3, 3))
         select[np.arange(len(feet)), :, feet] = self._rows[t, feet]
-        self._select = select.reshape(-1, 18)
-        self._targets = np.outer(self._heights[t, feet], (1.0, 1.0, 0.0)).ravel()
-        self._weight = np.repeat(self._weights[t, feet], 3)
-
-    def quadratic(self, configuration: Kinematics) -> Quadratic | None:
-        """Returns the Gauss-Newton model of the cost."""
-        if not len(self._weight):
-            return None
-        error = self._select @ configuration.feet().ravel() - self._targets
-        J = self._select @ configuration.feet_jacobians().reshape(18, -1)
-        return Quadratic(*kernels.weighted_squares(J, error, self._weight))
+        targets = np.outer(self._heights[t, feet], (1.0, 1.0, 0.0)).ravel()
+        self._wish(np.repeat(self._pull[t, feet], 3), targets, select)
