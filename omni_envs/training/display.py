@@ -14,7 +14,7 @@ LINE_EVERY = 15.0
 
 
 class TrainingDisplay:
-    """A bar with speed, time left, episode length, return and tracking error, on stderr.
+    """A bar with speed, time left, episode length, return and tracking errors, on stderr.
 
     Where stderr is no terminal, a line now and then instead of a bar.
 
@@ -63,6 +63,8 @@ class TrainingDisplay:
             f"episode {row['episode_length'] * self._dt:.2f} s  "
             f"return {row['episode_return']:.2f}  error {100 * row['body_error_m']:.1f} cm"
         )
+        if "object_error_m" in row:
+            figures += f"  object {100 * row['object_error_m']:.1f} cm"
         self._progress.update(self._task, completed=min(done, 1.0), figures=figures)
         now = time.monotonic()
         if self._lines and (now - self._last_line > LINE_EVERY or done >= 1.0):

@@ -34,8 +34,8 @@ class Learner(Protocol):
 
         Returns:
             Figures to log: ``episode_length`` (control steps) and ``episode_return``, means over
-            the episodes that finished last, ``body_error_m``, ``noise_level``, and those of the
-            update.
+            the episodes that finished last, the columns of ``tracking_errors``, ``noise_level``,
+            and those of the update.
 
         Raises:
             OmniEnvsError: Training diverged.

@@ -17,6 +17,19 @@ square over the bodies (N,), m; distance of the object from its reference (N,), 
 motion that is tracked next (N,)."""
 
 
+def tracking_errors(env: VectorEnv) -> dict[str, str]:
+    """Returns the columns of a training's history that are infos: column to info.
+
+    ``object_error_m`` is there where a reference of the environment has an object. The reward
+    alone does not show whether an object is moved: one that is left where it stands costs little.
+    """
+    columns = {"body_error_m": BODY_ERROR}
+    references = getattr(env.unwrapped, "references", ())
+    if any(r.object_poses is not None for r in references):
+        columns["object_error_m"] = OBJECT_ERROR
+    return columns
+
+
 class Policy(Protocol):
     """Observations (N, ·) at reference frames (N,) → actions (N, n)."""
 

@@ -39,7 +39,8 @@ class RunResult:
         seconds: Training time.
         control_dt: Seconds per control step.
         history: One row per update: ``steps``, ``seconds``, ``steps_per_s``, ``episode_length``
-            (control steps), ``episode_return``, ``body_error_m`` and the figures of the update.
+            (control steps), ``episode_return``, ``body_error_m``, ``object_error_m`` where there
+            is an object, and the figures of the update.
     """
 
     out: Path

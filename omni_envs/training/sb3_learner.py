@@ -23,7 +23,7 @@ from omni_envs.training.device import device_rng, restore_rng, torch_device
 from omni_envs.training.environment import learning_state, restore_learning_state
 from omni_envs.training.learner import History
 from omni_envs.training.ppo import TrackingPPO
-from omni_envs.training.rollout import BODY_ERROR
+from omni_envs.training.rollout import tracking_errors
 from omni_envs.training.sb3_vec_env import SB3VecEnv
 
 
@@ -40,7 +40,7 @@ class SB3Learner:
         self._seed, self._env = config.seed, env
         self._device = torch_device(config.device)
         self._ppo = TrackingPPO(VecMonitor(adapter), config.ppo, config.seed, self._device)
-        self._errors = _TrackingError(adapter)
+        self._errors = _TrackingErrors(adapter)
 
     @property
     def steps(self) -> int:
@@ -64,7 +64,7 @@ class SB3Learner:
         return {
             "episode_length": mean("l"),
             "episode_return": mean("r"),
-            "body_error_m": self._errors.mean,
+            **self._errors.means,
             "noise_level": float(getattr(self._env.unwrapped, "noise_level", 1.0)),
             **ppo.figures,
         }
@@ -107,21 +107,24 @@ class SB3Learner:
         """Nothing to free: the environment belongs to the caller."""
 
 
-class _TrackingError(BaseCallback):
-    """Mean tracking error over the steps of a rollout."""
+class _TrackingErrors(BaseCallback):
+    """Mean tracking errors over the steps of a rollout."""
 
     def __init__(self, env: SB3VecEnv) -> None:
         super().__init__()
         self._env = env
-        self.mean = float("nan")
-        self._values: list[float] = []
+        self._infos = tracking_errors(env.env)
+        self._values: dict[str, list[float]] = {column: [] for column in self._infos}
+        self.means: dict[str, float] = dict.fromkeys(self._infos, float("nan"))
 
     def _on_step(self) -> bool:
-        value = self._env.batched_infos.get(BODY_ERROR)
-        if value is not None:
-            self._values.append(float(np.mean(value)))
+        infos = self._env.batched_infos
+        for column, name in self._infos.items():
+            if name in infos:
+                self._values[column].append(float(np.mean(infos[name])))
         return True
 
     def _on_rollout_end(self) -> None:
-        self.mean = float(np.mean(self._values)) if self._values else float("nan")
-        self._values.clear()
+        for column, values in self._values.items():
+            self.means[column] = float(np.mean(values)) if values else float("nan")
+            values.clear()

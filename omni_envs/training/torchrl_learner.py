@@ -24,7 +24,7 @@ from omni_envs.training.config import TrainConfig
 from omni_envs.training.device import device_rng, restore_rng, torch_device
 from omni_envs.training.environment import learning_state, restore_learning_state
 from omni_envs.training.learner import History
-from omni_envs.training.rollout import BODY_ERROR
+from omni_envs.training.rollout import tracking_errors
 from omni_envs.training.torch_threads import torch_threads
 from omni_envs.training.torchrl_env import EPISODE_LENGTH, EPISODE_RETURN, make_torchrl_env
 from omni_envs.training.torchrl_network import TrackingNetwork, actor_and_critic, observation_keys
@@ -43,7 +43,8 @@ class TorchRLLearner:
         torch.manual_seed(config.seed)
         self._config, self._vector = config, env
         self._device = torch_device(config.device)
-        self._env = make_torchrl_env(env, infos=(BODY_ERROR,))
+        self._errors = tracking_errors(env)
+        self._env = make_torchrl_env(env, infos=tuple(self._errors.values()))
         keys = list(self._env.observation_spec.keys())
         seen, privileged = observation_keys(keys)
         space: Any = env.single_action_space
@@ -92,13 +93,13 @@ class TorchRLLearner:
         ends = (rollout["next", key][done].tolist() for key in (EPISODE_RETURN, EPISODE_LENGTH))
         self._episodes.extend(zip(*ends, strict=True))
         mean = np.mean(self._episodes, axis=0) if self._episodes else (np.nan, np.nan)
-        error = rollout["next", BODY_ERROR].mean().item()
+        errors = {c: rollout["next", name].mean().item() for c, name in self._errors.items()}
         with torch_threads(max(1, (os.cpu_count() or 1) // 2)):
             figures = self.ppo.learn(rollout)
         return {
             "episode_length": float(mean[1]),
             "episode_return": float(mean[0]),
-            "body_error_m": error,
+            **errors,
             "noise_level": float(getattr(self._vector.unwrapped, "noise_level", 1.0)),
             **figures,
         }

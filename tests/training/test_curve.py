@@ -38,6 +38,12 @@ def test_picture_shows_something(tmp_path):
     assert picture[..., :3].std() > 0.02
 
 
+def test_an_object_is_a_panel_of_its_own_also_where_only_later_rows_tell_it(tmp_path):
+    later = [{**row, "object_error_m": 0.2} for row in HISTORY[2:]]
+    width = imread(plot_curve(tmp_path, HISTORY, 0.02)).shape[1]
+    assert imread(plot_curve(tmp_path, HISTORY[:2] + later, 0.02)).shape[1] == width * 4 // 3
+
+
 def test_nothing_to_draw_is_one_clear_error(tmp_path):
     with pytest.raises(InvalidDataError, match="at least one update"):
         plot_curve(tmp_path, [], 0.02)

@@ -18,6 +18,12 @@ def test_a_line_tells_speed_time_left_and_how_well_it_goes(capsys):
         assert part in line
 
 
+def test_the_object_is_told_where_there_is_one(capsys):
+    with TrainingDisplay(steps=10**6, time_limit=0.0, control_dt=0.02, show=True) as display:
+        display.update({**ROW, "object_error_m": 0.671})
+    assert "object 67.1 cm" in capsys.readouterr().err
+
+
 def test_the_time_limit_counts_where_it_comes_first(capsys):
     with TrainingDisplay(steps=10**9, time_limit=80.0, control_dt=0.02, show=True) as display:
         display.update(ROW)

@@ -77,6 +77,13 @@ def test_a_run_directory_holds_what_it_should(config, env, tmp_path):
     assert 0 < result.history[-1]["body_error_m"] < 1.5
 
 
+def test_the_history_of_a_task_with_an_object_tells_where_it_is(trainer, config, tmp_path):
+    task = {"env": "OmniEnvs/G1BoxCarry-v0", "env_options": {"randomization": {"variants": 1}}}
+    row = train(config(tmp_path, steps=2 * ROLLOUT, **task)).history[-1]
+    # It starts within 5 cm per axis of its reference.
+    assert set(row) == COLUMNS | {"object_error_m"} and 0.005 < row["object_error_m"] < 0.2
+
+
 def test_an_average_of_the_weights_acts_and_the_newest_go_on(config, env, tmp_path):
     made = config(tmp_path)
     made = dataclasses.replace(made, ppo=dataclasses.replace(made.ppo, average_updates=3))
