@@ -58,6 +58,9 @@ class Arguments:
     """Go on from the last checkpoint in the run directory, with the settings saved there, but for
     what --ppo, --training-options, --num-envs, --num-threads and --device change."""
 
+    start_from: str = ""
+    """Run directory or published policy whose networks the new run begins with: fine-tuning."""
+
     time_limit: float = 0.0
     """Seconds of training, earlier parts included, after which it ends anyway; 0 = no limit."""
 
@@ -92,6 +95,10 @@ def make_config(arguments: Arguments) -> TrainConfig:
             raise InvalidOptionError(
                 f"{arguments.out} is a run on {config.env}: --env must say so."
             )
+        if arguments.start_from:
+            raise InvalidOptionError(
+                "--start-from: a run that goes on has networks already; give a new --out."
+            )
         return _going_on(arguments, replace(config, **ends))
     return RECIPES[arguments.recipe].config(
         arguments.env,
@@ -103,6 +110,7 @@ def make_config(arguments: Arguments) -> TrainConfig:
         trainer=arguments.trainer,
         num_threads=arguments.num_threads or 0,
         seed=arguments.seed,
+        start_from=arguments.start_from,
         **ends,
     )
 

@@ -108,12 +108,19 @@ def test_resumes_and_shows_a_table(run, reference, capsys):
         (("--resume",), "config.json"),
         (("--env", "OmniEnvs/G1BoxCary-v0"), "G1BoxCarry"),
         (("--steps", "0"), "steps must be positive"),
+        (("--start-from", "nowhere"), "nowhere"),
     ],
 )
 def test_bad_input_is_one_line_and_status_1(tmp_path, reference, capsys, more, message):
     assert train.main(_words(tmp_path / "new", reference, *more)) == 1
     error = capsys.readouterr().err.strip()
     assert message in error and error.startswith("train.py: ") and "\n" not in error
+
+
+def test_a_run_that_goes_on_starts_from_no_other(run, capsys):
+    words = ["--steps", "96", "--out", str(run), "--resume", "--start-from", str(run)]
+    assert train.main(words) == 1
+    assert "--start-from: a run that goes on has networks already" in capsys.readouterr().err
 
 
 def test_the_device_is_the_runs_unless_another_is_asked_for(run, tmp_path):

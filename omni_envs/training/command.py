@@ -26,6 +26,8 @@ def command(config: TrainConfig) -> str:
         "episodes": config.evaluation_episodes,
         "out": config.out,
     }
+    if config.start_from:
+        flags["start-from"] = config.start_from
     recipe, changes = _recipe(config)
     for name, value in changes.items():
         text = value if name == "num_envs" else json.dumps(value)

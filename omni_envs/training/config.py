@@ -113,6 +113,9 @@ class TrainConfig:
         checkpoint_every: Updates between two checkpoints.
         evaluation_episodes: Episodes of the evaluation.
         ppo: Hyper-parameters.
+        start_from: Run directory or published policy whose networks this run begins with, to
+            fine-tune them, e.g. on another motion; empty for new networks. Steps count from 0, and
+            the optimiser knows nothing yet.
     """
 
     env: str
@@ -129,6 +132,7 @@ class TrainConfig:
     checkpoint_every: int = 50
     evaluation_episodes: int = 100
     ppo: PPOConfig = field(default_factory=PPOConfig)
+    start_from: str = ""
 
     def __post_init__(self) -> None:
         for name in ("steps", "num_envs", "checkpoint_every", "evaluation_episodes"):
@@ -142,6 +146,10 @@ class TrainConfig:
         if self.device not in DEVICES:
             raise InvalidOptionError(
                 f"TrainConfig: device must be 'auto', 'cpu' or 'cuda'; got {self.device!r}."
+            )
+        if not isinstance(self.start_from, str):
+            raise InvalidOptionError(
+                f"TrainConfig: start_from must be a path as text; got {self.start_from!r}."
             )
         object.__setattr__(self, "out", Path(self.out))
         for name in ("env_options", "training_options"):

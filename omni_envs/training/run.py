@@ -23,6 +23,7 @@ from omni_envs.training.curve import write_history
 from omni_envs.training.device import machine, torch_device
 from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.environment import make_env
+from omni_envs.training.fine_tuning import with_networks_of
 from omni_envs.training.learner import History, Learner, autoreset_mode, make_learner
 from omni_envs.training.stretches import Stretch, check_changes, lengthened, set_exploration
 
@@ -107,17 +108,20 @@ def _train(
     progress: bool | None,
 ) -> RunResult:
     state = Checkpoint.load(start) if start else learner.state(0.0, [])
+    if config.start_from and not start:
+        state = with_networks_of(config.start_from, state, config.ppo.initial_std)
     if not state.optimizer:
         raise InvalidOptionError(
-            f"{config.out} holds a published policy, without what a training needs to go on."
+            f"{config.out} holds a published policy, without what a training needs to go on: "
+            "start a run of its own from it (start_from)."
         )
     if start:
         check_changes(TrainConfig.load(config.out), config)
         set_exploration(state, config)
     config.save()
-    if start:
+    if start or config.start_from:
         learner.restore(state)
-    else:
+    if not start:
         state.save(config.out)
     history, before, begin = state.history, state.seconds, time.perf_counter()
     here = machine(torch_device(config.device), config.num_threads)

@@ -15,7 +15,7 @@ Stretch = dict[str, Any]
 """``from``: control steps at its begin; ``machine``: see ``device.machine``; ``config``: settings
 (``TrainConfig.to_dict``)."""
 
-_FIXED = ("env", "trainer", "seed", "env_options")
+_FIXED = ("env", "trainer", "seed", "env_options", "start_from")
 _FIXED_PPO = ("hidden",)
 # What does not change what is learnt.
 _ASIDE = ("out", "steps", "time_limit", "checkpoint_every", "evaluation_episodes")

@@ -84,7 +84,7 @@ class Chase(VectorEnv):
         }
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def chase() -> type[Chase]:
     """The class, so that a test chooses the number of environments."""
     return Chase

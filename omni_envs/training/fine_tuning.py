@@ -1,0 +1,38 @@
+"""Beginning with the networks of another run: fine-tuning."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+from omni_envs.errors import InvalidOptionError
+from omni_envs.training.checkpoint import Checkpoint
+from omni_envs.training.network_policy import find_checkpoint
+
+
+def with_networks_of(run: str | Path, state: Checkpoint, initial_std: float) -> Checkpoint:
+    """Returns the state of a new run with the networks of another one.
+
+    Actor, critic and observation statistics are taken over, the actor as it is evaluated: averaged
+    where the run averages. The optimiser, the steps and what the environment has learnt are new.
+
+    Args:
+        run: Run directory or published policy, of either trainer.
+        state: The new run before its first update.
+        initial_std: Exploration noise to begin with, the geometric mean over the joints.
+
+    Raises:
+        FileFormatError: There is no checkpoint, or it is damaged.
+        InvalidOptionError: Its networks have other shapes than those of the new run.
+    """
+    policy = {k: v.clone() for k, v in Checkpoint.load(find_checkpoint(run)).acting.items()}
+    shapes = [{k: tuple(v.shape) for k, v in p.items()} for p in (policy, state.policy)]
+    if shapes[0] != shapes[1]:
+        other = sorted(k for k in shapes[0] | shapes[1] if shapes[0].get(k) != shapes[1].get(k))
+        raise InvalidOptionError(
+            f"start_from: the networks of {run} have other shapes than those of this run: "
+            f"{', '.join(other)}. Robot, observation and ppo.hidden must be the same."
+        )
+    policy["log_std"] += math.log(initial_std) - policy["log_std"].mean()
+    return replace(state, policy=policy)
