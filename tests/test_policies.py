@@ -20,6 +20,8 @@ from omni_envs.training.rollout import play
 FOLDER = Path(__file__).parents[1] / "policies"
 POLICIES = sorted(p for p in FOLDER.glob("*") if p.is_dir())
 SECONDS = 3.0
+LEAST = 0.5
+"""A policy that fails more often than not is not published."""
 
 pytestmark = pytest.mark.parametrize("folder", POLICIES, ids=lambda p: p.name)
 
@@ -27,8 +29,8 @@ pytestmark = pytest.mark.parametrize("folder", POLICIES, ids=lambda p: p.name)
 def test_the_card_is_about_the_evaluation(folder):
     figures = json.loads((folder / "evaluation.json").read_text())
     card = (folder / CARD).read_text()
-    assert figures["episodes"] >= 200 and figures["success_rate"] >= 0.8
-    assert figures["carried_rate"] is None or figures["carried_rate"] >= 0.8
+    assert figures["episodes"] >= 200 and figures["success_rate"] >= LEAST
+    assert figures["carried_rate"] is None or figures["carried_rate"] >= LEAST
     assert f"**{figures['success_rate']:.1%}**" in card
     assert "python train.py --recipe" in card and "Apache-2.0" in card
     for name in (STRIP, MOTION, "curve.png", "curve.csv", "policy.json"):

@@ -90,8 +90,10 @@ _SMALL_TRAINING = {
         "start_share": 0.2,
     },
     # The box carry lasts longer than the task's limit of 10 s: no episode would put down a box that
-    # it lifted itself, as those of the evaluation do.
-    "termination": {"max_seconds": None},
+    # it lifted itself, as those of the evaluation do. An object left on the ground is 0.7 m from
+    # its reference, which the task's 1 m lets pass: a run of 58 M steps learnt to leave it there.
+    "termination": {"max_seconds": None, "object_position": 0.4, "object_after": 0.0},
+    "randomization": {"variants": 512},
     # The body terms forgive drift: with the task's weight and width of 0.5 and 0.3 m a policy
     # arrived 0.4 m short of its box, where it had nothing to lift.
     "reward": {"anchor_position": {"weight": 3.0, "sigma": 0.2}},

@@ -56,4 +56,13 @@ def test_what_grows_in_training_is_whole_in_the_evaluation():
     assert trained.reset.growth is not None and evaluated.reset.growth is None
     assert trained.reset.noise == evaluated.reset.noise == make_config().reset.noise
     whole = make_config().randomization
-    assert trained.randomization == whole == replace(evaluated.randomization, seed=0)
+    assert replace(trained.randomization, variants=whole.variants) == whole
+    assert whole == replace(evaluated.randomization, seed=0)
+
+
+def test_a_policy_may_lose_its_object_less_far_in_training_than_in_the_evaluation():
+    recipe, task = RECIPES["small"], make_config().termination
+    trained = make_config(**merged(recipe.env_options, recipe.training_options)).termination
+    evaluated = make_config(**evaluation_options(recipe.env_options)).termination
+    assert trained.object_position < task.object_position == evaluated.object_position
+    assert trained.object_after == 0.0 and trained.object_angle == task.object_angle
