@@ -114,8 +114,8 @@ class TrainConfig:
         evaluation_episodes: Episodes of the evaluation.
         ppo: Hyper-parameters.
         start_from: Run directory or published policy whose networks this run begins with, to
-            fine-tune them, e.g. on another motion; empty for new networks. Steps count from 0, and
-            the optimiser knows nothing yet.
+            fine-tune them, e.g. on another motion; empty for new networks. Steps count from 0, the
+            optimiser knows nothing yet, and exploration begins with ``ppo.initial_std``.
     """
 
     env: str
