@@ -20,8 +20,9 @@ from omni_envs.training.rollout import play
 FOLDER = Path(__file__).parents[1] / "policies"
 POLICIES = sorted(p for p in FOLDER.glob("*") if p.is_dir())
 SECONDS = 3.0
-LEAST = 0.5
-"""A policy that fails more often than not is not published."""
+LEAST = 0.8
+SHORT = {"g1_box_carry": "60 % with everything randomized: off-centre boxes tip over"}
+"""Published short of that, by name and why. The test fails when one is not short any more."""
 
 pytestmark = pytest.mark.parametrize("folder", POLICIES, ids=lambda p: p.name)
 
@@ -29,14 +30,21 @@ pytestmark = pytest.mark.parametrize("folder", POLICIES, ids=lambda p: p.name)
 def test_the_card_is_about_the_evaluation(folder):
     figures = json.loads((folder / "evaluation.json").read_text())
     card = (folder / CARD).read_text()
-    assert figures["episodes"] >= 200 and figures["success_rate"] >= LEAST
-    assert figures["carried_rate"] is None or figures["carried_rate"] >= LEAST
+    assert figures["episodes"] >= 200
     assert f"**{figures['success_rate']:.1%}**" in card
     assert "python train.py --recipe" in card and "Apache-2.0" in card
     for name in (STRIP, MOTION, "curve.png", "curve.csv", "policy.json"):
         assert (folder / name).stat().st_size > 0
     assert sum(p.stat().st_size for p in folder.rglob("*") if p.is_file()) < 6e6
     assert str(Path.home()) not in card and "/tmp" not in (folder / "config.json").read_text()
+
+
+def test_it_succeeds_often_enough(folder, request):
+    if folder.name in SHORT:
+        request.applymarker(pytest.mark.xfail(strict=True, reason=SHORT[folder.name]))
+    figures = json.loads((folder / "evaluation.json").read_text())
+    assert figures["success_rate"] >= LEAST
+    assert figures["carried_rate"] is None or figures["carried_rate"] >= LEAST
 
 
 def test_the_file_is_the_network_on_its_own_motion(folder):

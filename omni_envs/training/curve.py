@@ -14,13 +14,6 @@ from omni_envs.errors import InvalidDataError, MissingDependencyError
 History = Sequence[dict[str, float]]
 
 CURVE_CSV, CURVE_PNG = "curve.csv", "curve.png"
-PANELS = (
-    ("episode_length", "episode length (s)"),
-    ("episode_return", "return per episode"),
-    ("body_error_m", "mean body position error (cm)"),
-    ("object_error_m", "mean object position error (cm)"),
-)
-"""Column of ``curve.csv``, title. A column that no row has is not drawn."""
 
 
 def write_history(run: Path, history: History) -> Path:
@@ -55,11 +48,15 @@ def plot_curve(run: Path, history: History, control_dt: float) -> Path:
     if not history:
         raise InvalidDataError("Learning curve", "history", "at least one update", "none")
     steps = [row["steps"] / 1e6 for row in history]
-    panels = [p for p in PANELS if any(p[0] in row for row in history)]
+    panels = [
+        ("episode_length", "episode length (s)", control_dt),
+        ("episode_return", "return per episode", 1.0),
+        ("body_error_m", "mean body position error (cm)", 100.0),
+    ]
+    if any("object_error_m" in row for row in history):
+        panels.append(("object_error_m", "mean object position error (cm)", 100.0))
     figure = Figure(figsize=(4.0 * len(panels), 3.4), layout="constrained")
-    axes_of_panels = figure.subplots(1, len(panels), squeeze=False)[0]
-    for axes, (key, title) in zip(axes_of_panels, panels, strict=True):
-        scale = {"episode_length": control_dt, "episode_return": 1.0}.get(key, 100.0)
+    for axes, (key, title, scale) in zip(figure.subplots(1, len(panels)), panels, strict=True):
         # Rows of earlier versions have fewer columns.
         values = np.array([row.get(key, np.nan) * scale for row in history])
         axes.plot(steps, values, color="#1f5fa8", linewidth=0.6, alpha=0.35)

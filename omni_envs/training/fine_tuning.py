@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
 from omni_envs.errors import InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.network_policy import find_checkpoint
+from omni_envs.training.stretches import explore_with
 
 
 def with_networks_of(run: str | Path, state: Checkpoint, initial_std: float) -> Checkpoint:
@@ -34,5 +34,5 @@ def with_networks_of(run: str | Path, state: Checkpoint, initial_std: float) -> 
             f"start_from: the networks of {run} have other shapes than those of this run: "
             f"{', '.join(other)}. Robot, observation and ppo.hidden must be the same."
         )
-    policy["log_std"] += math.log(initial_std) - policy["log_std"].mean()
+    explore_with(policy, initial_std)
     return replace(state, policy=policy)

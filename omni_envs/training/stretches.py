@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from omni_envs.errors import InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 Stretch = dict[str, Any]
 """``from``: control steps at its begin; ``machine``: see ``device.machine``; ``config``: settings
@@ -61,10 +64,21 @@ def check_changes(before: TrainConfig, after: TrainConfig) -> None:
         )
 
 
-def set_exploration(state: Checkpoint, config: TrainConfig) -> None:
-    """Moves the exploration noise of a policy to another ``initial_std``, if that is asked for.
+def explore_with(policy: Mapping[str, Tensor], std: float) -> None:
+    """Moves the exploration noise of a policy in place.
 
     The joints keep their ratios; the geometric mean becomes what was asked for.
+
+    Args:
+        policy: Weights (``Checkpoint.policy``).
+        std: Standard deviation of the actions.
+    """
+    log_std = policy["log_std"]
+    log_std += math.log(std) - log_std.mean()
+
+
+def set_exploration(state: Checkpoint, config: TrainConfig) -> None:
+    """Moves the exploration noise of a policy to another ``initial_std``, if that is asked for.
 
     Args:
         state: The run so far; its policy is changed in place.
@@ -72,8 +86,7 @@ def set_exploration(state: Checkpoint, config: TrainConfig) -> None:
     """
     wanted = config.ppo.initial_std
     if state.stretches and state.stretches[-1]["config"]["ppo"]["initial_std"] != wanted:
-        log_std = state.policy["log_std"]
-        log_std += math.log(wanted) - log_std.mean()
+        explore_with(state.policy, wanted)
 
 
 def commands(config: TrainConfig, stretches: Sequence[Stretch]) -> list[str]:

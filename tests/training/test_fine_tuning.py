@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import pytest
-from gymnasium.vector import AutoresetMode
 
 pytest.importorskip("torch")
 import torch
@@ -11,9 +10,9 @@ import torch
 from omni_envs.errors import FileFormatError, InvalidOptionError
 from omni_envs.training.checkpoint import Checkpoint, checkpoints
 from omni_envs.training.config import PPOConfig, TrainConfig
+from omni_envs.training.learner import autoreset_mode
 from omni_envs.training.run import train
 
-MODES = {"sb3": AutoresetMode.SAME_STEP, "torchrl": AutoresetMode.DISABLED}
 PACKAGES = {"sb3": "stable_baselines3", "torchrl": "torchrl"}
 PPO = PPOConfig(rollout_steps=8, epochs=2, minibatches=2, hidden=(16,), average_updates=3)
 
@@ -26,7 +25,7 @@ def old(chase, tmp_path_factory):
         pytest.importorskip(package)
         made[trainer] = tmp_path_factory.mktemp(trainer)
         config = TrainConfig("Chase", made[trainer], 512, trainer, 16, ppo=PPO)
-        train(config, env=chase(16, True, MODES[trainer]))
+        train(config, env=chase(16, True, autoreset_mode(config)))
     return made
 
 
@@ -35,7 +34,7 @@ def old(chase, tmp_path_factory):
 def test_it_begins_with_what_the_other_is_evaluated_with(old, before, trainer, chase, tmp_path):
     ppo = replace(PPO, initial_std=0.25)
     config = TrainConfig("Chase", tmp_path, 256, trainer, 16, ppo=ppo, start_from=str(old[before]))
-    result = train(config, env=chase(16, True, MODES[trainer]))
+    result = train(config, env=chase(16, True, autoreset_mode(config)))
     source = Checkpoint.load(checkpoints(old[before])[-1]).acting
     first, last = (Checkpoint.load(checkpoints(tmp_path)[i]) for i in (0, -1))
     assert first.steps == 0 and result.steps == 256
@@ -48,8 +47,8 @@ def test_it_begins_with_what_the_other_is_evaluated_with(old, before, trainer, c
 
 
 def test_what_cannot_be_begun_with_is_one_clear_error(old, chase, tmp_path):
-    env = chase(16, True, MODES["sb3"])
     config = TrainConfig("Chase", tmp_path / "new", 256, num_envs=16, ppo=PPO)
+    env = chase(16, True, autoreset_mode(config))
     wider = replace(config, ppo=replace(PPO, hidden=(17,)), start_from=str(old["sb3"]))
     with pytest.raises(InvalidOptionError, match=r"other shapes .*actor.*ppo\.hidden"):
         train(wider, env=env)
@@ -61,8 +60,8 @@ def test_what_cannot_be_begun_with_is_one_clear_error(old, chase, tmp_path):
 
 
 def test_a_run_that_goes_on_keeps_where_it_began(old, chase, tmp_path):
-    env = chase(16, True, MODES["sb3"])
     config = TrainConfig("Chase", tmp_path, 128, num_envs=16, ppo=PPO, start_from=str(old["sb3"]))
+    env = chase(16, True, autoreset_mode(config))
     train(config, env=env)
     assert train(replace(config, steps=256), resume=True, env=env).steps == 256
     with pytest.raises(InvalidOptionError, match="start_from of a run that goes on"):
@@ -75,4 +74,4 @@ def test_a_published_policy_has_what_is_needed(old, chase, tmp_path):
     config = TrainConfig(
         "Chase", tmp_path / "new", 128, num_envs=16, ppo=PPO, start_from=str(tmp_path / "p")
     )
-    assert train(config, env=chase(16, True, MODES["sb3"])).steps == 128
+    assert train(config, env=chase(16, True, autoreset_mode(config))).steps == 128
