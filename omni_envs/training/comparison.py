@@ -17,12 +17,14 @@ from omni_envs.training.curve import CURVE_CSV, smoothed
 ITS_OWN = ("seed", "out", "num_threads", "device", "steps", "time_limit", "checkpoint_every")
 """Fields of ``TrainConfig`` that do not change what is learnt."""
 COLOURS = ("#1f5fa8", "#d1662b", "#3c8f53", "#8a4fa3", "#a8871f", "#4d4d4d")
+_OBJECT = "object_error_m"
 PANELS = (
     ("episode_length", "episode length (control steps)", 1.0),
     ("episode_return", "return per episode", 1.0),
     ("body_error_m", "mean body position error (cm)", 100.0),
+    (_OBJECT, "mean object position error (cm)", 100.0),
 )
-"""Column of ``curve.csv``, title, factor to its unit."""
+"""Column of ``curve.csv``, title, factor to its unit. The last is drawn where all runs have it."""
 POINTS = 400
 
 
@@ -77,6 +79,7 @@ def group_runs(runs: Sequence[str | Path]) -> tuple[Group, ...]:
         for name in settings
         if any(other.get(name) != settings[name] for _, other, _ in found)
     }
+    drawn = [key for key, *_ in PANELS if all(key in columns for _, _, columns in found)]
     groups: dict[str, list[tuple[Path, dict[str, np.ndarray]]]] = {}
     for run, settings, columns in found:
         words = [f"{name} {settings[name]}" for name in sorted(different & set(settings))]
@@ -88,7 +91,7 @@ def group_runs(runs: Sequence[str | Path]) -> tuple[Group, ...]:
             steps,
             {
                 key: np.stack([np.interp(steps, c["steps"], smoothed(c[key])) for _, c in members])
-                for key, _, _ in PANELS
+                for key in drawn
             },
         )
         for label, members in groups.items()
@@ -109,8 +112,9 @@ def plot_groups(groups: Sequence[Group], path: str | Path) -> Path:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise MissingDependencyError("matplotlib", "viewer", "Drawing a curve") from error
-    figure = Figure(figsize=(12, 3.8), layout="constrained")
-    for axes, (key, title, scale) in zip(figure.subplots(1, len(PANELS)), PANELS, strict=True):
+    panels = [panel for panel in PANELS if all(panel[0] in group.curves for group in groups)]
+    figure = Figure(figsize=(4.0 * len(panels), 3.8), layout="constrained")
+    for axes, (key, title, scale) in zip(figure.subplots(1, len(panels)), panels, strict=True):
         for i, group in enumerate(groups):
             values, colour = group.curves[key] * scale, COLOURS[i % len(COLOURS)]
             million = group.steps / 1e6
@@ -143,7 +147,10 @@ def _columns(run: Path) -> dict[str, np.ndarray]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     try:
-        names = ("steps", *(panel[0] for panel in PANELS))
+        names = ["steps", *(panel[0] for panel in PANELS)]
+        # Without an object, or in the first rows of a run of an earlier version, there is no error.
+        if not all(row.get(_OBJECT) for row in rows):
+            names.remove(_OBJECT)
         columns = {name: np.array([float(row[name]) for row in rows]) for name in names}
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, "columns", "numbers", repr(error)) from error

@@ -25,6 +25,7 @@ from omni_envs.training.display import TrainingDisplay
 from omni_envs.training.environment import make_env
 from omni_envs.training.fine_tuning import with_networks_of
 from omni_envs.training.learner import History, Learner, autoreset_mode, make_learner
+from omni_envs.training.network_policy import find_checkpoint
 from omni_envs.training.stretches import Stretch, check_changes, lengthened, set_exploration
 
 KEEP_CHECKPOINTS = 3
@@ -84,7 +85,10 @@ def train(
         )
     if resume and not found:
         raise InvalidOptionError(f"{config.out} holds no checkpoint to resume from.")
-    torch_device(config.device)  # fails before the environment is made
+    # Both fail before the environment is made.
+    torch_device(config.device)
+    if config.start_from and not found:
+        find_checkpoint(config.start_from)
     options = merged(config.env_options, config.training_options)
     mode = {"autoreset_mode": autoreset_mode(config).name}
     made = env or make_env(config, config.num_envs, {**options, **mode})

@@ -13,7 +13,7 @@ from omni_envs.training.config import PPOConfig, TrainConfig
 from omni_envs.training.curve import write_history
 
 
-def _run(folder, trainer="sb3", seed=0, slope=1.0, updates=10, **ppo):
+def _run(folder, trainer="sb3", seed=0, slope=1.0, updates=10, object_from=None, **ppo):
     """A run whose return grows by ``slope`` per 100 steps."""
     out = folder / f"{trainer}{seed}-{slope}-{updates}"
     TrainConfig(
@@ -28,6 +28,8 @@ def _run(folder, trainer="sb3", seed=0, slope=1.0, updates=10, **ppo):
         }
         for k in range(1, updates + 1)
     ]
+    for row in rows[object_from:] if object_from is not None else ():
+        row["object_error_m"] = 0.01 * row["episode_return"]
     write_history(out, rows)
     return out
 
@@ -56,6 +58,18 @@ def test_curves_are_compared_at_common_steps(runs):
     final = sb3.final()["episode_return"]
     assert final == pytest.approx({"mean": 12.0, "std": np.std([8.0, 16.0], ddof=1)})
     assert torchrl.final()["episode_return"] == pytest.approx({"mean": 24.0, "std": 0.0})
+
+
+def test_object_is_compared_where_every_run_has_one(tmp_path):
+    both = [_run(tmp_path, object_from=0), _run(tmp_path, seed=1, slope=3.0, object_from=0)]
+    (group,) = group_runs(both)
+    np.testing.assert_allclose(group.curves["object_error_m"][1], 0.03 * group.steps / 100)
+    wide = imread(plot_groups([group], tmp_path / "with.png")).shape[1]
+    # The second run has none, the third has it in its later rows only.
+    for other in (_run(tmp_path, seed=2), _run(tmp_path, seed=3, object_from=5)):
+        (group,) = group_runs([both[0], other])
+        assert "object_error_m" not in group.curves
+        assert imread(plot_groups([group], tmp_path / "without.png")).shape[1] < wide
 
 
 def test_groups_are_named_by_what_differs(tmp_path):

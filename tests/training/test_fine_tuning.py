@@ -52,8 +52,8 @@ def test_what_cannot_be_begun_with_is_one_clear_error(old, chase, tmp_path):
     wider = replace(config, ppo=replace(PPO, hidden=(17,)), start_from=str(old["sb3"]))
     with pytest.raises(InvalidOptionError, match=r"other shapes .*actor.*ppo\.hidden"):
         train(wider, env=env)
-    with pytest.raises(FileFormatError, match="checkpoints of a run"):
-        train(replace(config, start_from=str(tmp_path / "nothing")), env=env)
+    with pytest.raises(FileFormatError, match="checkpoints of a run"):  # before it makes "Chase"
+        train(replace(config, start_from=str(tmp_path / "nothing")))
     with pytest.raises(InvalidOptionError, match="start_from must be a path"):
         replace(config, start_from=7)
     assert not (tmp_path / "new").exists() or not checkpoints(tmp_path / "new")
