@@ -176,11 +176,16 @@ def _write_card(
         text = "success with the object always within 50 cm of its reference"
         rows.insert(1, (text, f"{evaluation.carried_rate:.1%}"))
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
-    million = f"{state.steps / 1e6:.{1 if state.steps >= 1e6 else 3}f} million"
-    trained = f"{million} control steps in {_time(state.seconds)}"
-    if state.stretches:
-        trained += f" on {', then '.join(machines(state.stretches))}"
-    steps = "\n".join(f"$ {line}" for line in commands(config, state.stretches))
+    trained_steps, seconds, stretches = state.steps, state.seconds, state.stretches
+    for parent in reversed(state.ancestors):
+        trained_steps, seconds = trained_steps + parent["steps"], seconds + parent["seconds"]
+        stretches = [*parent["stretches"], *stretches]
+    million = f"{trained_steps / 1e6:.{1 if trained_steps >= 1e6 else 3}f} million"
+    trained = f"{million} control steps in {_time(seconds)}"
+    if stretches:
+        trained += f" on {', then '.join(machines(stretches))}"
+    lines = commands(config, state.stretches, state.ancestors)
+    steps = "\n".join(f"$ {line}" for line in lines)
     trainer = {"sb3": "Stable-Baselines3", "torchrl": "TorchRL"}[config.trainer]
     curve = "\n![Learning curve](curve.png)\n" if (out / "curve.png").is_file() else ""
     card = f"""# {out.name}

@@ -19,6 +19,7 @@ from omni_envs.export import export_run
 from omni_envs.publish import CARD, MOTION, STRIP, publish
 from omni_envs.references import open_reference
 from omni_envs.robots import G1
+from omni_envs.training.checkpoint import Checkpoint
 from omni_envs.training.config import TrainConfig
 from omni_envs.training.evaluate import evaluate_run
 from omni_envs.training.network_policy import find_checkpoint, load_actor
@@ -47,6 +48,10 @@ def run(sway, tmp_path_factory):
         },
     )
     train(config)
+    # As if it had begun with a run of two hours.
+    state = Checkpoint.load(find_checkpoint(config.out))
+    state.ancestors = [{"steps": 2_000_000, "seconds": 7200.0, "stretches": state.stretches}]
+    state.save(config.out)
     return config.out
 
 
@@ -71,8 +76,10 @@ def test_the_folder_holds_what_a_policy_needs(run, folder):
     config = TrainConfig.load(folder)
     assert config.steps == 64  # those that it got, whatever was asked for
     trained = replace(TrainConfig.load(run), out=Path("runs/sway"), evaluation_episodes=6)
-    assert trained.command() in card and "Apache-2.0" in card
-    assert "64 million" not in card and "0.000 million control steps in 0 minutes" in card
+    parent = replace(trained, out=Path("runs/sway_1"), steps=2_000_000)
+    child = replace(trained, start_from="runs/sway_1")
+    assert f"$ {parent.command()}\n$ {child.command()}\n" in card and "Apache-2.0" in card
+    assert "2.0 million control steps in 2.0 hours on " in card
     assert f"{config.num_threads} CPU core" in card
     with (folder / "curve.csv").open() as file:
         assert float(list(csv.DictReader(file))[-1]["steps"]) == 64

@@ -19,9 +19,9 @@ except ImportError as error:
 
 FOLDER = "checkpoints"
 _NAME = re.compile(r"step_(\d+)\.pt")
-_FORMAT = 3
-_READ = (1, 2, 3)
-"""Formats that are read; 1 had no state of the environment, 2 no average."""
+_FORMAT = 4
+_READ = (1, 2, 3, 4)
+"""Formats that are read; 1 had no state of the environment, 2 no average, 3 no ancestors."""
 
 
 @dataclass
@@ -38,6 +38,8 @@ class Checkpoint:
         rng: State of torch's random generator.
         stretches: Where and with which settings the run was trained, and from which step on; see
             ``omni_envs.training.stretches``.
+        ancestors: ``steps``, ``seconds`` and ``stretches`` of the runs that the networks come from,
+            oldest first; see ``omni_envs.training.fine_tuning``.
         environment: What episodes have taught the environment; see ``environment.learning_state``.
             None in a file of format 1, and where the environment does not learn.
         device_rng: State of the GPU's random generator, or None for training on the CPU.
@@ -57,6 +59,7 @@ class Checkpoint:
     history: list[dict[str, float]] = field(default_factory=list)
     episodes: list[tuple[float, float]] = field(default_factory=list)
     stretches: list[dict[str, Any]] = field(default_factory=list)
+    ancestors: list[dict[str, Any]] = field(default_factory=list)
     environment: dict[str, Any] | None = None
     device_rng: Tensor | None = None
     average: dict[str, Any] | None = None

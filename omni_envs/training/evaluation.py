@@ -52,8 +52,8 @@ class Evaluation:
         window_body_error_mean_m: As ``body_error_mean_m``, in the windows.
         windows: Number of windows.
         window_seconds: Length of a window, s.
-        steps: Control steps that the policy was trained for.
-        seconds: Its training time.
+        steps: Control steps of the run, without those of runs that it began with.
+        seconds: Its training time, likewise.
         motions: Each motion by itself where there are several, which take turns in the episodes.
     """
 

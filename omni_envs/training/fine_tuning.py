@@ -15,7 +15,8 @@ def with_networks_of(run: str | Path, state: Checkpoint, initial_std: float) -> 
     """Returns the state of a new run with the networks of another one.
 
     Actor, critic and observation statistics are taken over, the actor as it is evaluated: averaged
-    where the run averages. The optimiser, the steps and what the environment has learnt are new.
+    where the run averages, and so is how they were trained. The optimiser, the steps and what the
+    environment has learnt are new.
 
     Args:
         run: Run directory or published policy, of either trainer.
@@ -26,13 +27,15 @@ def with_networks_of(run: str | Path, state: Checkpoint, initial_std: float) -> 
         FileFormatError: There is no checkpoint, or it is damaged.
         InvalidOptionError: Its networks have other shapes than those of the new run.
     """
-    policy = {k: v.clone() for k, v in Checkpoint.load(find_checkpoint(run)).acting.items()}
+    other = Checkpoint.load(find_checkpoint(run))
+    policy = {k: v.clone() for k, v in other.acting.items()}
     shapes = [{k: tuple(v.shape) for k, v in p.items()} for p in (policy, state.policy)]
     if shapes[0] != shapes[1]:
-        other = sorted(k for k in shapes[0] | shapes[1] if shapes[0].get(k) != shapes[1].get(k))
+        differ = sorted(k for k in shapes[0] | shapes[1] if shapes[0].get(k) != shapes[1].get(k))
         raise InvalidOptionError(
             f"start_from: the networks of {run} have other shapes than those of this run: "
-            f"{', '.join(other)}. Robot, observation and ppo.hidden must be the same."
+            f"{', '.join(differ)}. Robot, observation and ppo.hidden must be the same."
         )
     explore_with(policy, initial_std)
-    return replace(state, policy=policy)
+    parent = {"steps": other.steps, "seconds": other.seconds, "stretches": other.stretches}
+    return replace(state, policy=policy, ancestors=[*other.ancestors, parent])

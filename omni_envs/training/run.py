@@ -6,6 +6,7 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from gymnasium.vector import VectorEnv
 
@@ -26,7 +27,7 @@ from omni_envs.training.environment import make_env
 from omni_envs.training.fine_tuning import with_networks_of
 from omni_envs.training.learner import History, Learner, autoreset_mode, make_learner
 from omni_envs.training.network_policy import find_checkpoint
-from omni_envs.training.stretches import Stretch, check_changes, lengthened, set_exploration
+from omni_envs.training.stretches import check_changes, lengthened, set_exploration
 
 KEEP_CHECKPOINTS = 3
 
@@ -129,7 +130,10 @@ def _train(
         state.save(config.out)
     history, before, begin = state.history, state.seconds, time.perf_counter()
     here = machine(torch_device(config.device), config.num_threads)
-    stretches = lengthened(state.stretches, config, learner.steps, here)
+    lineage: dict[str, Any] = {
+        "stretches": lengthened(state.stretches, config, learner.steps, here),
+        "ancestors": state.ancestors,
+    }
     over = config.ppo.average_updates
     average = WeightAverage(over, state.average) if over else None
     seconds, saved = before, learner.steps
@@ -156,9 +160,9 @@ def _train(
                 if name != "steps":
                     board.add_scalar(f"training/{name}", value, learner.steps)
             if len(history) % config.checkpoint_every == 0:
-                saved = _save(config.out, learner, seconds, history, stretches, average)
+                saved = _save(config.out, learner, seconds, history, lineage, average)
     if saved != learner.steps:
-        _save(config.out, learner, seconds, history, stretches, average)
+        _save(config.out, learner, seconds, history, lineage, average)
     return RunResult(config.out, learner.steps, seconds, control_dt, tuple(history))
 
 
@@ -167,11 +171,11 @@ def _save(
     learner: Learner,
     seconds: float,
     history: History,
-    stretches: list[Stretch],
+    lineage: dict[str, Any],
     average: WeightAverage | None,
 ) -> int:
     state = learner.state(seconds, history)
-    replace(state, stretches=stretches, average=average.state if average else None).save(run)
+    replace(state, **lineage, average=average.state if average else None).save(run)
     keep_newest(run, KEEP_CHECKPOINTS)
     write_history(run, history)
     return learner.steps

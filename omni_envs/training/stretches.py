@@ -89,15 +89,29 @@ def set_exploration(state: Checkpoint, config: TrainConfig) -> None:
         explore_with(state.policy, wanted)
 
 
-def commands(config: TrainConfig, stretches: Sequence[Stretch]) -> list[str]:
+def commands(
+    config: TrainConfig, stretches: Sequence[Stretch], ancestors: Sequence[Mapping[str, Any]] = ()
+) -> list[str]:
     """Returns the commands that repeat a run, one per stretch.
 
     Args:
         config: The run as it ended, with the steps that it got.
         stretches: Its stretches; without any the run is one.
+        ancestors: The runs that it began with (``Checkpoint.ancestors``), which come first; their
+            directories are numbered ones beside its own.
     """
+    lines: list[str] = []
+    for number, parent in enumerate(ancestors, 1):
+        if not parent["stretches"]:  # of a version that did not write them down
+            continue
+        out = config.out.with_name(f"{config.out.name}_{number}")
+        last = TrainConfig.from_dict(parent["stretches"][-1]["config"])
+        before = f"{config.out}_{number - 1}" if lines else last.start_from
+        run = replace(config, out=out, steps=parent["steps"], start_from=before)
+        lines += commands(run, parent["stretches"])
+        config = replace(config, start_from=str(out))
     if not stretches:
-        return [config.command()]
+        return [*lines, config.command()]
     ends = [*(s["from"] for s in stretches[1:]), config.steps]
     settings = [
         replace(
@@ -106,12 +120,13 @@ def commands(config: TrainConfig, stretches: Sequence[Stretch]) -> list[str]:
             steps=end,
             time_limit=0.0,
             evaluation_episodes=config.evaluation_episodes,
+            start_from=config.start_from,
         )
         for s, end in zip(stretches, ends, strict=True)
     ]
     first, *rest = settings
     later = [now.command(before) for before, now in zip(settings, rest, strict=False)]
-    return [first.command(), *later]
+    return [*lines, first.command(), *later]
 
 
 def machines(stretches: Sequence[Stretch]) -> list[str]:

@@ -1,5 +1,6 @@
 """A run that begins with the networks of another one."""
 
+import itertools
 from dataclasses import replace
 
 import pytest
@@ -44,6 +45,20 @@ def test_it_begins_with_what_the_other_is_evaluated_with(old, before, trainer, c
             assert torch.equal(first.policy[name], value), name
     assert not all(torch.equal(last.policy[k], v) for k, v in source.items())
     assert f"--start-from {old[before]}" in config.command()
+
+
+def test_how_the_networks_were_trained_is_kept(old, chase, tmp_path):
+    """Over two runs and a stop."""
+    chain = [old["sb3"], tmp_path / "second", tmp_path / "third"]
+    for before, out in itertools.pairwise(chain):
+        config = TrainConfig("Chase", out, 128, num_envs=16, ppo=PPO, start_from=str(before))
+        train(config, env=chase(16, True, autoreset_mode(config)))
+    train(replace(config, steps=256), resume=True, env=chase(16, True, autoreset_mode(config)))
+    parents = [Checkpoint.load(checkpoints(run)[-1]) for run in chain[:2]]
+    state = Checkpoint.load(checkpoints(chain[2])[-1])
+    assert [a["steps"] for a in state.ancestors] == [512, 128] and state.steps == 256
+    assert [a["seconds"] for a in state.ancestors] == [p.seconds for p in parents]
+    assert [a["stretches"] for a in state.ancestors] == [p.stretches for p in parents]
 
 
 def test_what_cannot_be_begun_with_is_one_clear_error(old, chase, tmp_path):

@@ -2,6 +2,7 @@
 
 import shlex
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -109,6 +110,27 @@ def test_the_commands_repeat_the_run(config):
         assert asdict(again.ppo) == asdict(expected.ppo)
         # What is gone is None.
         assert _there(again.training_options) == _there(expected.training_options)
+
+
+def test_the_commands_of_ancestors_come_first(config):
+    """A run that began with a run that began with a published policy of an earlier version."""
+    first = replace(config, out=Path("elsewhere"), start_from="policies/old")
+    second = replace(config, out=Path("policies/x"), start_from="elsewhere", num_envs=8)
+    run = replace(config, out=Path("runs/x"), start_from="policies/x", num_envs=16, steps=300)
+    parents = [
+        {"steps": steps, "seconds": 1.0, "stretches": stretches}
+        for steps, stretches in (
+            (50, []),
+            (100, lengthened([], first, 0, "a machine")),
+            (200, lengthened([], second, 0, "a machine")),
+        )
+    ]
+    lines = commands(run, lengthened([], run, 0, "a machine"), parents)
+    words = [shlex.split(line)[2:] for line in lines]
+    typed = [script.make_config(tyro.cli(script.Arguments, args=w)) for w in words]
+    assert [(c.steps, c.num_envs) for c in typed] == [(100, config.num_envs), (200, 8), (300, 16)]
+    assert [c.out for c in typed] == [Path("runs/x_2"), Path("runs/x_3"), Path("runs/x")]
+    assert [c.start_from for c in typed] == ["policies/old", "runs/x_2", "runs/x_3"]
 
 
 def _there(options):
