@@ -78,6 +78,7 @@ def generate(
                 done += int(row["frames"])
                 if progress is not None:
                     progress(done, total)
+        manifest.tidy()
         # What once failed and is no longer asked for is no news.
         asked = {item.name for item in items} | {row["name"] for row in broken}
         rows = [r for r in manifest.rows.values() if r["status"] == DONE or r["name"] in asked]

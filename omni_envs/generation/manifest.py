@@ -54,6 +54,21 @@ class Manifest:
             os.fsync(file.fileno())
         self.rows[row["name"]] = row
 
+    def tidy(self) -> None:
+        """Leaves the newest row of every name in this writer's file, which is whole throughout."""
+        if not self.path.is_file():
+            return
+        newest = {row["name"]: row for row in _lines(self.path)}
+        text = "".join(json.dumps(row, allow_nan=False) + "\n" for row in newest.values())
+        if text == self.path.read_text(encoding="utf-8", errors="replace"):
+            return
+        partial = self.path.with_suffix(f".{os.getpid()}.partial")
+        with partial.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(self.path)
+
 
 @contextmanager
 def sole_writer(folder: Path, shard: tuple[int, int]) -> Iterator[None]:

@@ -41,6 +41,8 @@ class PPOConfig:
         value_clip: Clipping range of the value, in units of return; 0 does not clip.
         value_weight: Weight of the value loss.
         entropy_weight: Weight of the entropy bonus.
+        action_weight: Weight of ‖μ‖², the squared mean action summed over the joints: keeps a
+            policy near what its action mode does by itself.
         max_grad_norm: Largest norm of the gradient.
         hidden: Widths of the hidden layers, of actor and critic alike.
         initial_std: Standard deviation of the exploration noise at the start, in units of action; a
@@ -62,6 +64,7 @@ class PPOConfig:
     value_clip: float = 0.2
     value_weight: float = 1.0
     entropy_weight: float = 0.005
+    action_weight: float = 0.0
     max_grad_norm: float = 1.0
     hidden: tuple[int, ...] = (512, 256, 128)
     initial_std: float = 1.0
@@ -223,6 +226,7 @@ class TrainConfig:
 _WHOLE = {"rollout_steps": 1, "epochs": 1, "minibatches": 1, "average_updates": 0}
 _FROM_ZERO = (
     "critic_learning_rate", "desired_kl", "value_clip", "value_weight", "entropy_weight",
+    "action_weight",
 )  # fmt: skip
 
 

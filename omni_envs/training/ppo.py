@@ -200,7 +200,7 @@ class TrackingPPO(PPO):
         }
 
     def _actor_backward(self, batch: Rollout) -> dict[str, Tensor]:
-        """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
+        """Adds the gradient of clipped surrogate, entropy and size; returns the figures to log."""
         clip = self.config.clip
         now = self.policy.get_distribution(batch.observations).distribution
         log_probability = now.log_prob(batch.actions).sum(dim=-1)
@@ -208,7 +208,9 @@ class TrackingPPO(PPO):
         clipped = ratio.clamp(1.0 - clip, 1.0 + clip)
         surrogate = -torch.min(ratio * batch.advantages, clipped * batch.advantages).mean()
         entropy = now.entropy().sum(dim=-1).mean()
-        (surrogate - self.config.entropy_weight * entropy).backward()
+        size = now.mean.square().sum(dim=-1).mean()
+        loss = surrogate - self.config.entropy_weight * entropy + self.config.action_weight * size
+        loss.backward()
         with torch.no_grad():
             kl = _gaussian_kl(batch.mean, batch.std, now.mean, now.stddev)
         return {

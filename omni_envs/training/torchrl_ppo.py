@@ -156,12 +156,14 @@ class TensorDictPPO:
         }
 
     def actor_backward(self, batch: TensorDictBase) -> dict[str, Tensor]:
-        """Adds the gradient of clipped surrogate and entropy; returns the figures to log."""
+        """Adds the gradient of clipped surrogate, entropy and size; returns the figures to log."""
         losses = self.policy_loss(batch)
-        (losses["loss_objective"] + losses["loss_entropy"]).backward()
+        now = self.policy_loss.now.base_dist
+        size = self.config.action_weight * now.mean.square().sum(dim=-1).mean()
+        (losses["loss_objective"] + losses["loss_entropy"] + size).backward()
         with torch.no_grad():
             acted = IndependentNormal(batch["loc"], batch["scale"]).base_dist
-            kl = kl_divergence(acted, self.policy_loss.now.base_dist)
+            kl = kl_divergence(acted, now)
         return {
             "kl": kl.sum(dim=-1).mean(),
             "surrogate_loss": losses["loss_objective"].detach(),

@@ -52,6 +52,25 @@ def test_torn_last_line_is_skipped_and_ended(tmp_path, row):
     assert set(Manifest(tmp_path).rows) == {ITEM.name, "b"}
 
 
+def test_tidying_keeps_the_newest_rows_and_other_shards(tmp_path, row):
+    one, two = (Manifest(tmp_path, (number, 2)) for number in (1, 2))
+    one.tidy()  # nothing there yet
+    assert not one.path.exists()
+    for key in ("old", "key"):
+        for name in (ITEM.name, "b"):
+            one.add(row | {"name": name, "key": key})
+    one.path.write_text(one.path.read_text() + "{torn")
+    two.add(row | {"name": "c"})
+    before, theirs = Manifest(tmp_path).rows, two.path.read_bytes()
+    one.tidy()
+    assert one.path.read_text().count("\n") == 2 and '"old"' not in one.path.read_text()
+    assert Manifest(tmp_path).rows == before and two.path.read_bytes() == theirs
+    whole = one.path.stat().st_mtime_ns
+    one.tidy()
+    assert one.path.stat().st_mtime_ns == whole
+    assert sorted(p.name for p in tmp_path.glob("manifest*")) == [one.path.name, two.path.name]
+
+
 def test_shards_write_apart_and_read_together(tmp_path, row):
     for number in (1, 2):
         Manifest(tmp_path, (number, 2)).add(row | {"name": str(number)})

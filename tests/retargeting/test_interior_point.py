@@ -80,4 +80,4 @@ def test_agrees_on_real_frames(grasp, cut, dense_clip_qp):
     np.testing.assert_allclose(ours.x, theirs, atol=5e-4)
     # The tolerance that refinement uses is as good for smoothness.
     coarse = solve_clip_qp(qp, 1e-5)
-    assert qp.cost(coarse.x) == pytest.approx(qp.cost(ours.x), rel=0.05)
+    assert qp.cost(coarse.x) == pytest.approx(qp.cost(ours.x), rel=0.1)

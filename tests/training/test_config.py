@@ -33,6 +33,7 @@ def test_defaults_are_the_published_ones():
         "value_clip": 0.2,
         "value_weight": 1.0,
         "entropy_weight": 0.005,
+        "action_weight": 0.0,
         "max_grad_norm": 1.0,
         "hidden": (512, 256, 128),
         "initial_std": 1.0,

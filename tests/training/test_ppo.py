@@ -159,7 +159,7 @@ def test_clipped_value_loss_is_the_larger_one():
 
 
 def test_two_threads_give_the_gradient_of_the_sum(chase):
-    learner = _learner(chase)
+    learner = _learner(chase, replace(SMALL, action_weight=0.1))
     learner.learn(1)
     batch = learner._rollout()
     learner._actor_backward(batch)
@@ -170,7 +170,9 @@ def test_two_threads_give_the_gradient_of_the_sum(chase):
         batch.observations, batch.actions
     )
     ratio = torch.exp(log_probability - batch.log_probability)
+    mean = learner.policy.get_distribution(batch.observations).distribution.mean
     loss = -(ratio * batch.advantages).mean() - 0.005 * entropy.mean()
+    loss += 0.1 * mean.norm(dim=-1).square().mean()
     loss += _value_loss(values.flatten(), batch.values, batch.returns, 0.2)
     loss.backward()
     for one, parameter in zip(found, learner.policy.parameters(), strict=True):

@@ -123,6 +123,7 @@ OTHER = PPOConfig(
     value_clip=0.0,
     value_weight=0.5,
     entropy_weight=0.02,
+    action_weight=0.05,
     max_grad_norm=0.1,
     hidden=(24,),
     initial_std=0.3,

@@ -37,8 +37,8 @@ _GRIP_UP, _GRIP_AHEAD = 0.12, 0.08
 # that is somewhat wider, or stands somewhat beside its place, does not land on top of it.
 _OPEN, _ABOVE = 0.15, 0.2  # beside the faces, and above the grip, before they come down; m
 _GRIP_DOWN = np.deg2rad(32.0)  # fingers below the horizontal while gripping
-_STAND, _WALK, _SQUAT = 0.920, 0.907, 0.545  # pelvis heights
-_LEAN = np.deg2rad(60.0)  # of the chest at the bottom of the squat
+_STAND, _WALK, _SQUAT = 0.920, 0.907, 0.520  # pelvis heights
+_LEAN = np.deg2rad(62.0)  # of the chest at the bottom of the squat
 _CLEARANCE = 0.075  # of a swinging foot
 _COM_HEIGHT = 0.93
 

@@ -21,7 +21,11 @@ TURN = np.deg2rad(25.0)
 HALF_STANCE = 0.095
 """Half the distance between the feet, m."""
 
-_REACH = 0.43  # box centre ahead of the ankles when it stands on the ground, m
+# Box centre ahead of the ankles when it stands on the ground, m. At 0.43 the knees of G1 passed it
+# by 8 mm: they knocked a box that is 10 % larger, or 5 cm nearer, out of its hands. The farther it
+# is, the more of the waist's torque it takes: 79 % at 0.43, 97 % at 0.49 with as quick a lift.
+_REACH = 0.47
+_LIFT = 2.0  # time to lift the box, and to put it down, s
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ def plan_box_carry() -> Plan:
     t = walk(0.75, [(0.29, 0, 0), (0.62, 0, 0), (0.91, 0, 0), (0.91, 0, 0)], 0, 0.64, 0.48)
     squat = t + 0.05, t + 1.35
     grasp = squat[1] + 0.35
-    lift = grasp + 0.10, grasp + 1.40
+    lift = grasp + 0.10, grasp + 0.10 + _LIFT
     t = lift[1] + 0.25
     x, y = 0.91, 0.0
     centres = []
@@ -82,7 +86,7 @@ def plan_box_carry() -> Plan:
         y += length * np.sin(heading * TURN)
         centres.append((x, y, heading * TURN))
     t = walk(t, centres, 0, 0.66, 0.48, 0.30)
-    lower = t + 0.05, t + 1.40
+    lower = t + 0.05, t + 0.05 + _LIFT
     release = lower[1] + 0.10
     rise = release + 0.30, release + 1.60
     t = rise[1] + 0.15
