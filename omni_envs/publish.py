@@ -176,12 +176,10 @@ def _write_card(
         text = "success with the object always within 50 cm of its reference"
         rows.insert(1, (text, f"{evaluation.carried_rate:.1%}"))
     table = "\n".join(f"| {name} | {value} |" for name, value in rows)
-    trained_steps, seconds, stretches = state.steps, state.seconds, state.stretches
-    for parent in reversed(state.ancestors):
-        trained_steps, seconds = trained_steps + parent["steps"], seconds + parent["seconds"]
-        stretches = [*parent["stretches"], *stretches]
-    million = f"{trained_steps / 1e6:.{1 if trained_steps >= 1e6 else 3}f} million"
-    trained = f"{million} control steps in {_time(seconds)}"
+    million = sum(run["steps"] for run in state.lineage) / 1e6
+    seconds = sum(run["seconds"] for run in state.lineage)
+    trained = f"{million:.{1 if million >= 1 else 3}f} million control steps in {_time(seconds)}"
+    stretches = [stretch for run in state.lineage for stretch in run["stretches"]]
     if stretches:
         trained += f" on {', then '.join(machines(stretches))}"
     lines = commands(config, state.stretches, state.ancestors)

@@ -13,6 +13,7 @@ from filelock import FileLock, Timeout
 
 from omni_envs.errors import OmniEnvsError
 from omni_envs.generation.item import DONE, Item, file_hash
+from omni_envs.references.npz import complete_file
 
 PATTERN = "manifest*.jsonl"
 """Names of manifests: every shard writes its own."""
@@ -62,12 +63,8 @@ class Manifest:
         text = "".join(json.dumps(row, allow_nan=False) + "\n" for row in newest.values())
         if text == self.path.read_text(encoding="utf-8", errors="replace"):
             return
-        partial = self.path.with_suffix(f".{os.getpid()}.partial")
-        with partial.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(self.path)
+        with complete_file(self.path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
 
 
 @contextmanager

@@ -65,6 +65,12 @@ class Checkpoint:
     average: dict[str, Any] | None = None
 
     @property
+    def lineage(self) -> list[dict[str, Any]]:
+        """The ancestors and, last, this run, as one of theirs."""
+        own = {"steps": self.steps, "seconds": self.seconds, "stretches": self.stretches}
+        return [*self.ancestors, own]
+
+    @property
     def acting(self) -> dict[str, Tensor]:
         """Weights of the policy to evaluate and to export: averaged ones where there are any."""
         return {**self.policy, **self.average["weights"]} if self.average else self.policy

@@ -37,5 +37,4 @@ def with_networks_of(run: str | Path, state: Checkpoint, initial_std: float) -> 
             f"{', '.join(differ)}. Robot, observation and ppo.hidden must be the same."
         )
     explore_with(policy, initial_std)
-    parent = {"steps": other.steps, "seconds": other.seconds, "stretches": other.stretches}
-    return replace(state, policy=policy, ancestors=[*other.ancestors, parent])
+    return replace(state, policy=policy, ancestors=other.lineage)

@@ -71,7 +71,7 @@ def test_without_active_constraints_it_is_a_linear_solve(make_clip_qp, dense_cli
 
 
 def test_agrees_on_real_frames(grasp, cut, dense_clip_qp):
-    motion = retarget(cut(grasp, 16, 24), G1)
+    motion = retarget(cut(grasp, 10, 18), G1)
     program = ClipProgram(motion.source, G1, motion.options, 5e-6, motion.qpos)
     qp = program.linearise(motion.qpos, 0, motion.num_frames, 0.05)
     ours, theirs = solve_clip_qp(qp, 1e-10), solve_with_clarabel(qp, *dense_clip_qp(qp))
@@ -80,4 +80,4 @@ def test_agrees_on_real_frames(grasp, cut, dense_clip_qp):
     np.testing.assert_allclose(ours.x, theirs, atol=5e-4)
     # The tolerance that refinement uses is as good for smoothness.
     coarse = solve_clip_qp(qp, 1e-5)
-    assert qp.cost(coarse.x) == pytest.approx(qp.cost(ours.x), rel=0.1)
+    assert qp.cost(coarse.x) == pytest.approx(qp.cost(ours.x), rel=0.05)

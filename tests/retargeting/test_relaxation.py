@@ -70,7 +70,7 @@ def test_penetration_gives_way_before_speed_and_refinement_repairs_it(swaying):
     assert (before.frames.violations["stance"][given_up > TOLD] > TOLD).all()  # it went first
     for motion in (before, after):
         told = motion.frames.violations
-        speeding, beyond, summary = excess(motion, 0.04)
+        speeding, beyond, summary = excess(motion, SLOW.velocity_limits)
         assert speeding <= 0.0 and beyond <= 0.0
         # What is told is what is there.
         assert summary["penetration_max_m"] == pytest.approx(told["penetration"].max(), abs=1e-4)
