@@ -12,13 +12,13 @@ PACKAGE = Path(__file__).parents[1] / "omni_envs"
 # Every room may import from the rooms before it, never from those after it.
 ORDER = (
     "errors",
+    "files",
     "rotations",
     "resampling",
     "progress",
     "threads",
     "compilation",
     "processes",
-    "rotations",
     "registration",
     "robots",
     "scenes",

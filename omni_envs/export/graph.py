@@ -10,7 +10,6 @@ standard action in all modes, in training too.
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +19,7 @@ import numpy as np
 
 from omni_envs.errors import InvalidDataError, MissingDependencyError
 from omni_envs.export.description import COMMAND, PolicyDescription
+from omni_envs.files import complete_file
 
 try:
     import onnx
@@ -142,31 +142,26 @@ def write_graph(graph: PolicyGraph, path: Path, metadata: Mapping[str, str]) -> 
     Raises:
         InvalidDataError: The file that came out is not what the profile asks for.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(f".{os.getpid()}.partial")
     shapes = graph.eval().shapes()
     example = tuple(torch.zeros(shapes[name]) for name in graph.inputs)
-    try:
+    with complete_file(path) as temporary:
         with warnings.catch_warnings():
             # The tracing exporter is deprecated; the new one needs onnxscript and writes two files.
             warnings.simplefilter("ignore")
             torch.onnx.export(
                 graph,
                 example,
-                partial,
+                temporary,
                 input_names=list(graph.inputs),
                 output_names=list(graph.outputs),
                 opset_version=graph.opset,
                 dynamo=False,
             )
-        model = onnx.load(partial)
+        model = onnx.load(temporary)
         onnx.helper.set_model_props(model, dict(metadata))
         onnx.checker.check_model(model, full_check=True)
         _check_signature(model, shapes)
-        partial.write_bytes(model.SerializeToString())
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+        temporary.write_bytes(model.SerializeToString())
     return path
 
 

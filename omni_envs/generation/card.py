@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from omni_envs.errors import MissingDependencyError, RenderingError
+from omni_envs.files import complete_file
 from omni_envs.generation.item import DONE
 from omni_envs.references import Reference
-from omni_envs.references.npz import complete_file
 
 FIGURES = {
     "penetration_max_m": ("deepest penetration", "mm", 1e3),

@@ -12,8 +12,8 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from omni_envs.errors import OmniEnvsError
+from omni_envs.files import complete_file
 from omni_envs.generation.item import DONE, Item, file_hash
-from omni_envs.references.npz import complete_file
 
 PATTERN = "manifest*.jsonl"
 """Names of manifests: every shard writes its own."""

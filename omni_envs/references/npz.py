@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import uuid
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from tokenize import TokenError
 
 import numpy as np
 
 from omni_envs.errors import FileFormatError, InvalidDataError
+from omni_envs.files import complete_file
 
 DIGEST = "content_sha256"
 """Name of the array that holds the hash of all others."""
@@ -51,28 +49,6 @@ def write_npz(path: str | Path, arrays: Mapping[str, np.ndarray]) -> Path:
     with complete_file(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **plain)
     return Path(path)
-
-
-@contextmanager
-def complete_file(path: str | Path) -> Iterator[Path]:
-    """Gives a temporary file to write; at the end it takes the place of ``path``, or is gone.
-
-    Args:
-        path: The file that is there only when complete; its folder is made where needed.
-    """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.{uuid.uuid4().hex}.tmp")
-    try:
-        yield temporary
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-    except OSError as error:
-        error.filename = error.filename or str(path)  # a full disk does not tell
-        raise
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def read_npz(path: str | Path, *, checked: bool = True) -> dict[str, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import re
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from omni_envs.errors import FileFormatError, MissingDependencyError
+from omni_envs.files import complete_file
 
 try:
     import torch
@@ -78,13 +78,8 @@ class Checkpoint:
     def save(self, run: Path) -> Path:
         """Writes the checkpoint into a run directory; it is there whole or not at all."""
         path = run / FOLDER / f"step_{self.steps:012d}.pt"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_suffix(f".{os.getpid()}.partial")
-        with partial.open("wb") as file:
-            torch.save({"format": _FORMAT, **_on_cpu(vars(self))}, file)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
+        with complete_file(path) as temporary:
+            torch.save({"format": _FORMAT, **_on_cpu(vars(self))}, temporary)
         return path
 
     @classmethod

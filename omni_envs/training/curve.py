@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from omni_envs.errors import InvalidDataError, MissingDependencyError
+from omni_envs.files import complete_file
 
 History = Sequence[dict[str, float]]
 
@@ -19,13 +19,11 @@ CURVE_CSV, CURVE_PNG = "curve.csv", "curve.png"
 def write_history(run: Path, history: History) -> Path:
     """Writes one row per update as ``curve.csv``, atomically."""
     path = run / CURVE_CSV
-    partial = path.with_suffix(f".{os.getpid()}.partial")
     names = list(dict.fromkeys(name for row in history for name in row))
-    with partial.open("w", newline="") as file:
+    with complete_file(path) as temporary, temporary.open("w", newline="") as file:
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(history)
-    partial.replace(path)
     return path
 
 

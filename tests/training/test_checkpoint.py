@@ -41,7 +41,7 @@ def test_round_trip(tmp_path):
 def test_listed_oldest_first_and_partial_files_do_not_count(tmp_path):
     for steps in (5, 1200, 300):
         _checkpoint(steps).save(tmp_path)
-    (tmp_path / "checkpoints" / "step_000000000999.77.partial").write_bytes(b"half")
+    (tmp_path / "checkpoints" / ".step_000000000999.pt.77.tmp").write_bytes(b"half")
     (tmp_path / "checkpoints" / "step_best.pt").write_bytes(b"not ours")
     assert [Checkpoint.load(p).steps for p in checkpoints(tmp_path)] == [5, 300, 1200]
     assert checkpoints(tmp_path / "nowhere") == []

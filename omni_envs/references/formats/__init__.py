@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from omni_envs.errors import FileFormatError, InvalidOptionError
+from omni_envs.files import complete_file
 from omni_envs.references.formats.holosoma import HolosomaMotion
 from omni_envs.references.formats.motion import RATES, ForeignMotion, MotionFormat, is_rate
 from omni_envs.references.formats.qpos import HolosomaRetargeter, OmniRetargetDataset
 from omni_envs.references.formats.tracking import BeyondMimic, Mjlab, UnitreeDeploy
 from omni_envs.references.formats.unitree_csv import UnitreeCsv, read_csv, write_csv
-from omni_envs.references.npz import complete_file, read_npz
+from omni_envs.references.npz import read_npz
 from omni_envs.references.reference import Reference
 from omni_envs.robots import Robot, get_robot
 
