@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +18,9 @@ from omni_envs.tracking.motion import MotionLibrary
 from omni_envs.tracking.randomization import start_widths
 
 TESTS = ("anchor_height", "anchor_tilt", "end_effector_height", "object")
+
+_PART = 32
+"""Fewest simulations that are worth a thread: handing it over takes as long as five of them."""
 
 
 class Judged(NamedTuple):
@@ -59,10 +64,20 @@ class CompiledTask:
         library: The motions.
         num: N.
         samples: Physics steps that a contact sensor remembers.
+        threads: Threads that share the simulations. What comes out does not depend on them.
     """
 
-    def __init__(self, task: TrackingTask, library: MotionLibrary, num: int, samples: int) -> None:
-        self._everyone = np.arange(num)
+    def __init__(
+        self,
+        task: TrackingTask,
+        library: MotionLibrary,
+        num: int,
+        samples: int,
+        threads: int = 1,
+    ) -> None:
+        parts = max(1, min(threads, num // _PART))
+        self._first, *self._others = np.array_split(np.arange(num), parts)
+        self._helpers = ThreadPoolExecutor(parts - 1) if self._others else None
         self.numbers = task.numbers(samples)
         plan = kernels.make_plan(self.numbers, library.at, body_tree(task.robot))
         self._plan = (*plan, library.table)
@@ -112,7 +127,7 @@ class CompiledTask:
         flags = np.empty((len(TESTS) + 4, num), bool)
         figures, reward = np.empty((len(self.figures), num)), np.empty(num)
         policy, critic = self._outputs(out)
-        some, due = kernels.settle(
+        given = (
             *self._plan,
             episodes.table,
             simulation.qpos,
@@ -126,13 +141,9 @@ class CompiledTask:
             diverged,
             seed_of(rng),
             self.noise_share,
-            self._everyone,
-            figures,
-            flags,
-            reward,
-            policy,
-            critic,
         )
+        written = figures, flags, reward, policy, critic
+        some, due = self._shared(kernels.settle, given, written)
         episodes.action = action
         return Judged(reward, flags[5], flags[6], flags[7], figures, flags, some, due)
 
@@ -176,6 +187,16 @@ class CompiledTask:
             widths = share[:, None] * widths
         seen = self._seen(simulation, episodes, ids, rng, out)
         kernels.begin(*seen, draws, widths)
+
+    def _shared(
+        self, loop: Callable[..., tuple[bool, bool]], given: Sequence[Any], written: Sequence[Any]
+    ) -> tuple[bool, bool]:
+        """Runs a loop over all simulations, each thread over its own; returns what holds of any."""
+        if self._helpers is None:
+            return loop(*given, self._first, *written)
+        helped = [self._helpers.submit(loop, *given, ids, *written) for ids in self._others]
+        found = [loop(*given, self._first, *written), *(help.result() for help in helped)]
+        return any(some for some, _ in found), any(due for _, due in found)
 
     def _seen(
         self,

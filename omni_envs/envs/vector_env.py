@@ -194,7 +194,9 @@ class OmniVectorEnv(PlainSpec, VectorEnv[Observation, np.ndarray, np.ndarray]):
         self.simulation = Simulation(
             models[0], self.robot, self._variants, num_envs, config.physics.substeps, num_threads
         )
-        self._task = CompiledTask(plain, self._library, num_envs, models[0].samples)
+        self._task = CompiledTask(
+            plain, self._library, num_envs, models[0].samples, self.simulation.batch.nthread
+        )
         if max_episode_steps is None and config.termination.max_seconds is not None:
             max_episode_steps = max(round(config.termination.max_seconds / dt), 1)
         default = self.robot.default_joint_array

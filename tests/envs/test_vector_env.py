@@ -44,6 +44,24 @@ def test_the_same_seed_and_actions_are_bit_identical_at_any_thread_count(make):
     identical(one, rollout(make(num_threads=3), ACTIONS))
 
 
+def test_many_simulations_share_the_threads_and_are_bit_identical(make):
+    actions = np.random.default_rng(0).normal(size=(20, 100, 29)) * 0.5
+    runs = []
+    for threads in (1, 2, 3):
+        env = make(
+            100,
+            num_threads=threads,
+            observation={"privileged": True},
+            termination={"max_seconds": 0.2, "end_effector_height": 0.05},
+        )
+        env.reset(seed=3)
+        steps = [env.step(action) for action in actions]
+        assert any(step[2].any() for step in steps) and any(step[3].any() for step in steps)
+        runs.append([(o["policy"], o["critic"], *others) for o, *others, _ in steps])
+    for run in runs[1:]:
+        identical(runs[0], run)
+
+
 def test_a_seeded_reset_repeats_everything(make):
     env = make(preset="beyondmimic")
     first = rollout(env, ACTIONS)
