@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from omni_envs import files
 from omni_envs.cli import main
-from omni_envs.references import build, npz
+from omni_envs.references import build
 
 LIBRARY = Path(__file__).parents[2] / "references/box_carry/g1/nominal.npz"
 RECIPE = "robots: [g1]\nsources: [{demonstration: box_carry}]\n"
@@ -43,7 +44,7 @@ def test_a_full_disk(tmp_path, capsys, monkeypatch):
     def full(fd):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(npz.os, "fsync", full)
+    monkeypatch.setattr(files.os, "fsync", full)
     out = tmp_path / "new" / "out.npz"
     words = ["convert", str(LIBRARY), "--to", "mjlab", "--out", str(out)]
     assert main(words) == 1

@@ -33,14 +33,14 @@ def dataset(tmp_path_factory):
 def test_every_item_is_made_once(dataset):
     out, figures, seen = dataset
     assert figures == {
-        "items": 2, "made": 2, "kept": 0, "failed": 0, "frames": 306, "failed_names": [],
+        "items": 2, "made": 2, "kept": 0, "failed": 0, "frames": 312, "failed_names": [],
     }  # fmt: skip
-    assert seen[-1] == (306, 306)
+    assert seen[-1] == (312, 312)
     rows = Manifest(out).rows
     for variation in ENTRY.variations:
         name = f"box_carry/g1/{variation.name}"
         reference = Reference.load(out / f"{name}.npz")
-        assert reference.num_frames == 153 == rows[name]["frames"]
+        assert reference.num_frames == 156 == rows[name]["frames"]
         assert rows[name]["key"] == reference.provenance["key"]
         assert rows[name]["summary"]["relaxed_frames"] == 0 and rows[name]["cpu_seconds"] > 0
     assert {p.suffix for p in out.rglob("*.*")} <= {".npz", ".jsonl", ".md", ".png"}
