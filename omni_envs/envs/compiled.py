@@ -20,7 +20,7 @@ from omni_envs.tracking.randomization import start_widths
 TESTS = ("anchor_height", "anchor_tilt", "end_effector_height", "object")
 
 _PART = 32
-"""Fewest simulations that are worth a thread: handing it over takes as long as five of them."""
+"""Fewest simulations that are worth a thread: handing it over takes as long as eight of them."""
 
 
 class Judged(NamedTuple):

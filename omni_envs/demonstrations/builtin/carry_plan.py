@@ -88,6 +88,7 @@ def plan_box_carry() -> Plan:
     t = walk(t, centres, 0, 0.66, 0.48, 0.30)
     lower = t + 0.05, t + 0.05 + _LIFT
     release = lower[1] + 0.10
+    # The hands are open by then: those that were not yet took tilted boxes along.
     rise = release + 0.60, release + 1.90
     t = rise[1] + 0.15
     back = [(x - s * np.cos(TURN), y - s * np.sin(TURN), TURN) for s in (0.20, 0.20)]
