@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from omni_envs import rotations
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.retargeting.clip_kinematics import ClipKinematics, trace_clip
 from omni_envs.retargeting.clip_qp import Band, ClipQP
@@ -28,6 +27,7 @@ from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.qp import step_rows
 from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.stance_plan import ANCHORED, stance_tiers
+from omni_envs.retargeting.tangents import difference, motion_steps
 from omni_envs.retargeting.tasks import Quadratic
 from omni_envs.robots import KEYPOINTS, Robot
 
@@ -39,24 +39,6 @@ _RIDGE = 1e-6
 _RESERVE = 0.005
 _K = len(KEYPOINTS)
 _FEET = 10  # rows of a frame that hold feet
-
-
-def difference(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(T, nv) tangents end ⊖ start of (T, 7 + n) configurations."""
-    turn = rotations.difference(start[:, 3:7], end[:, 3:7])
-    return np.hstack([end[:, :3] - start[:, :3], turn, end[:, 7:] - start[:, 7:]])
-
-
-def motion_steps(qpos: np.ndarray) -> np.ndarray:
-    """(T - 1, nv) tangents q_{t+1} ⊖ q_t of (T, 7 + n) configurations."""
-    return difference(qpos[:-1], qpos[1:])
-
-
-def moved(qpos: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """(T, 7 + n) configurations q_t ⊕ x_t."""
-    turned = rotations.multiply(qpos[:, 3:7], rotations.exp(x[:, 3:6]))
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    return np.hstack([qpos[:, :3] + x[:, :3], turned, qpos[:, 7:] + x[:, 6:]])
 
 
 class ClipProgram:

@@ -19,7 +19,7 @@ class ContactLimit(RowLimit):
     the first to the second geom. Bodies of the surroundings do not move with dq.
 
     Args:
-        tolerance: Accepted depth against the surroundings, m.
+        tolerance: Accepted depth against the surroundings, m; infinite for none of that limit.
     """
 
     def __init__(self, tolerance: float) -> None:

@@ -13,13 +13,17 @@ from omni_envs.retargeting.ramps import ramps
 from omni_envs.retargeting.tasks import CostTask, Quadratic
 
 _NEAR = 0.01  # m
+# Gaps (m) at which the pull is full, and from which on it fades: what a robot cannot reach is no
+# reason to contort it.
+_FULL, _FADES = 0.01, 0.08
 
 
 class ContactTask(CostTask):
-    """½ w Σ ‖gap‖² from where the human touches the surface to the nearest point of the link.
+    """w Σ ρ(‖gap‖) from where the human touches the surface to the nearest point of the link.
 
     A cost beside the interaction mesh, which keeps hands near an object but not on the same place
-    of it.
+    of it. ρ(d) = ½ d² up to a = 1 cm, so that a strong pull closes small gaps; its force a stays up
+    to b = 8 cm and falls with a (b/d)² beyond.
 
     Args:
         source: The motion, with its contact points.
@@ -48,13 +52,14 @@ class ContactTask(CostTask):
         """Chooses the source frame; None switches the task off."""
         touching = [] if t is None else np.flatnonzero(self._ramps[:, t]).tolist()
         self._active = [(self._links[i], self._places[i, t]) for i in touching]
-        self._ramp = np.repeat([self._ramps[i, t] for i in touching], 3)
+        self._ramp = np.array([self._ramps[i, t] for i in touching])
 
     def quadratic(self, configuration: Kinematics) -> Quadratic | None:
-        """Returns the model of second order in the motion of the nearest points.
+        """Returns a model of second order in the motion of the nearest points.
 
-        The gap s u of length s has the curvature uuᵀ + (s/ℓ)(C - uuᵀ), with ℓ its length up to the
-        core of the link and C the directions along which the nearest point does not slide.
+        ½‖gap‖² of a gap s u of length s has the curvature uuᵀ + (s/ℓ)(C - uuᵀ), with ℓ the length
+        up to the core of the link and C the directions along which the nearest point does not
+        slide. That times ρ'(s)/s is the curvature of a model which lies above w ρ.
         """
         if not self._active:
             return None
@@ -66,7 +71,19 @@ class ContactTask(CostTask):
             bodies, np.array([point for _, point, *_ in nearest])
         )
         J = (roots @ np.moveaxis(jacobian, 0, 1)).reshape(gaps.size, -1)
-        return Quadratic(*kernels.weighted_squares(J, -gaps.ravel(), self._weight * self._ramp))
+        share, losses = pull(np.linalg.norm(gaps, axis=1))
+        weights = self._weight * np.repeat(self._ramp * share, 3)
+        H, g, _ = kernels.weighted_squares(J, -gaps.ravel(), weights)
+        return Quadratic(H, g, self._weight * float(self._ramp @ losses))
+
+
+def pull(distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """ρ'(d)/d and ρ(d) of (K,) distances d, m: see ``ContactTask``."""
+    d = np.maximum(distance, 1e-12)
+    share = np.minimum(1.0, _FULL / d) * np.minimum(1.0, _FADES / d) ** 2
+    steady = _FULL * (np.minimum(d, _FADES) - 0.5 * _FULL)
+    fading = _FULL * np.maximum(_FADES - _FADES**2 / d, 0.0)
+    return share, np.where(d <= _FULL, 0.5 * d * d, steady + fading)
 
 
 class _Link:

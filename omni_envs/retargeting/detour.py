@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from omni_envs.retargeting.clip_program import ClipProgram, difference, moved
+from omni_envs.retargeting.clip_program import ClipProgram
 from omni_envs.retargeting.interior_point import solve_clip_qp
+from omni_envs.retargeting.tangents import difference, moved
 
 # A smoothed motion that penetrates deeper (m) than the motion before is led around: it goes back to
 # that on the frames about, and more frames about are solved again, in boxes this wide, and narrower

@@ -50,3 +50,10 @@ class StepVelocityLimit(BoundLimit):
             return -unbounded, unbounded
         back = configuration.difference(self._previous)
         return back - self._step, back + self._step
+
+    def nearest(self, configuration: Kinematics, q: np.ndarray) -> np.ndarray:
+        """Returns the (nq,) configuration nearest to ``q`` that the limit allows."""
+        if self._previous is None:
+            return q
+        configuration.update(self._previous)
+        return configuration.step(np.clip(configuration.difference(q), -self._step, self._step))

@@ -62,7 +62,7 @@ class RetargetOptions:
         laplacian_weight: Weight of the deformation energy (OmniRetarget: 10).
         smoothness_weight: Weight of the distance to the previous frame (OmniRetarget: 0.2).
         contact_weight: Weight of the distance between a touching link and the point of the surface
-            that the human touches, 0 switches it off. Not in the paper.
+            that the human touches (see ``ContactTask``), 0 switches it off. Not in the paper.
         sole_weight: Weight of the distance between a sole and the support that the human has the
             whole sole on, 0 switches it off. Not in the paper.
         nominal_weight: Weight of base and legs against a nominal motion, where ``retarget`` is
@@ -97,7 +97,7 @@ class RetargetOptions:
     ground_points: int = 60
     laplacian_weight: float = 10.0
     smoothness_weight: float = 0.2
-    contact_weight: float = 400.0
+    contact_weight: float = 4000.0
     sole_weight: float = 1000.0
     nominal_weight: float = 5.0
     nominal_decay: float | None = 1.0 / 3.0

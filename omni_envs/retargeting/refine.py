@@ -17,7 +17,7 @@ import numpy as np
 
 from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import ProgressCallback
-from omni_envs.retargeting.clip_program import ClipProgram, moved
+from omni_envs.retargeting.clip_program import ClipProgram
 from omni_envs.retargeting.detour import led_around
 from omni_envs.retargeting.interior_point import solve_clip_qp
 from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
@@ -27,6 +27,7 @@ from omni_envs.retargeting.qp import step_bounds
 from omni_envs.retargeting.restoration import restore
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.solver import solve_daqp
+from omni_envs.retargeting.tangents import moved
 from omni_envs.robots import KEYPOINTS, Robot, get_robot
 
 # Frames solved at once, and frames on either side that are solved with them and thrown away: the

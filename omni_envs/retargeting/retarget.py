@@ -15,6 +15,7 @@ On every frame t (OmniRetarget, arXiv 2509.26633, eq. 3-4):
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -39,25 +40,26 @@ from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
+from omni_envs.retargeting.sketch import Sketch, sketched_frames
 from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.retargeting.stance_limit import StanceLimit
 from omni_envs.retargeting.stance_plan import (
     ANCHORED,
-    FootWishes,
     StancePlan,
     foot_wishes,
     plan_stance,
     stance_tiers,
 )
 from omni_envs.retargeting.tasks import CostTask
-from omni_envs.robots import KEYPOINTS, SIDES, Robot
+from omni_envs.robots import Robot
 
 # Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
 # step.
 _RELAXED = 2e-4
 _AHEAD = 0.9
-_STRIDE = 5  # frames between those that the plan of footholds is made from
+_BETTER = 0.98  # of the cost: what a second start must come below
+_FORBIDDEN = 1e3  # cost of a violation, 1/m
 _FIRST = 1e-5  # convergence on the first frame: whatever is left there drifts into the motion
 
 
@@ -136,13 +138,6 @@ def keypoint_positions(robot: Robot, source: SourceMotion, qpos: np.ndarray) -> 
         configuration.update(q)
         keypoints[t] = configuration.keypoints()
     return keypoints
-
-
-def _interpolate(at: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Linear interpolation of (len(known), …) values."""
-    flat = values.reshape(len(known), -1)
-    columns = [np.interp(at, known, column) for column in flat.T]
-    return np.stack(columns, axis=1).reshape(len(at), *values.shape[1:])
 
 
 def _check(source: SourceMotion) -> None:
@@ -224,6 +219,9 @@ class _Retargeter:
             step_solver,
             options,
         )
+        self.through_walls = FrameSolver(
+            self.configuration, list(tasks), bounds, [ContactLimit(np.inf)], step_solver, options
+        )
 
     def run(self, progress: ProgressCallback | None) -> Retargeted:
         frames, options = self.source.num_frames, self.options
@@ -231,12 +229,13 @@ class _Retargeter:
         energy, seconds = np.empty(frames), np.empty(frames)
         iterations = np.empty(frames, int)
         violations = np.empty((frames, len(RELAXATIONS)))
-        plan, previous = self._sketch()
+        previous = self._first().q
+        sketch = self._sketch(previous)
+        plan = self._plan(sketch)
         stance = StanceLimit(plan, self.options.stance)
         self.limits.append(stance)
         foothold = FootholdTask(plan)
         self.solver.tasks.append(foothold)
-        self.plan = plan
         for t in range(frames):
             start = perf_counter()
             self._place(t)
@@ -253,6 +252,8 @@ class _Retargeter:
                 options.convergence if t else _FIRST,
                 fallback=previous,
             )
+            if t > 0 and sketch.catches(t, self._cost()):
+                result = self._freed(sketch.pose(t), result)
             stance.record(self.configuration, t)
             previous = result.q
             qpos[t], iterations[t], violations[t] = result.q, result.iterations, result.violations
@@ -299,6 +300,7 @@ class _Retargeter:
 
     def _first(self) -> FrameResult:
         """Frame 0 without stance, previous frame or trust region: the best of several starts."""
+        self._place(0)
         self.smoothness.set_target(None)
         if self.velocity is not None:
             self.velocity.set_previous(None)
@@ -321,50 +323,65 @@ class _Retargeter:
         assert best is not None
         return self.solver.solve(best.q, options.first_iterations, options.trust_region, _FIRST)
 
-    def _sketch(self) -> tuple[StancePlan, np.ndarray]:
-        """Solves every few frames without stance, and plans the footholds near where the feet went.
+    def _cost(self) -> float:
+        """Value of mesh and contacts."""
+        contacts = self.touch.quadratic(self.configuration)
+        energy = self.mesh.energy(self.configuration)
+        return 0.5 * self.options.laplacian_weight * energy + (contacts.value if contacts else 0.0)
+
+    def _freed(self, pose: np.ndarray, caught: FrameResult) -> FrameResult:
+        """Solves a frame from another pose, as near to that as speed limits let it start.
+
+        Args:
+            pose: (nq,) where a robot that nothing stops would be.
+            caught: The result to beat.
 
         Returns:
-            The plan, and the (nq,) configuration of frame 0.
+            The better result; the configuration is there.
         """
-        source = self.source
-        every = np.unique(
-            np.append(np.arange(0, source.num_frames, _STRIDE), source.num_frames - 1)
+        options = self.options
+        before = self._cost() + _FORBIDDEN * max(caught.violations)
+        start = pose if self.velocity is None else self.velocity.nearest(self.configuration, pose)
+        freed = self.solver.solve(
+            start, options.iterations, options.trust_region, options.convergence
         )
-        feet = np.empty((len(every), 2, 3, 3))
-        for i, t in enumerate(every):
+        if self._cost() + _FORBIDDEN * max(freed.violations) < _BETTER * before:
+            return replace(freed, iterations=caught.iterations + freed.iterations)
+        self.configuration.update(caught.q)
+        return caught
+
+    def _sketch(self, first: np.ndarray) -> Sketch:
+        """Draws a sketch that begins with the (nq,) configuration of frame 0."""
+        frames = sketched_frames(self.source.num_frames)
+        qpos = np.tile(first, (len(frames), 1))
+        feet, costs = np.empty((len(frames), 2, 3, 3)), np.empty(len(frames))
+        options = self.options
+        for i, t in enumerate(frames):
             self._place(t)
-            if i == 0:
-                first = q = self._first().q
-                self.configuration.update(q)
-            else:
-                self.smoothness.set_target(q)
-                options = self.options
-                radius = _STRIDE * options.trust_region
-                q = self.solver.solve(
-                    q, options.iterations // 2, radius, 10 * options.convergence, restore=False
+            self.touch.set_frame(t)
+            self.configuration.update(first)
+            if i > 0:
+                self.smoothness.set_target(qpos[i - 1])
+                radius = (t - frames[i - 1]) * options.trust_region
+                qpos[i] = self.through_walls.solve(
+                    qpos[i - 1], options.iterations, radius, options.convergence, restore=False
                 ).q
-            feet[i] = self.configuration.feet()
-        wishes = foot_wishes(feet)
-        # Between these frames the feet follow the human's toes: the offset changes slowly.
-        human = source.keypoints[:, [KEYPOINTS.index(f"{side}_toe") for side in SIDES], :2]
-        frames = np.arange(source.num_frames)
-        wishes = FootWishes(
-            human + _interpolate(frames, every, wishes.tips - human[every]),
-            _interpolate(frames, every, wishes.headings),
-            _interpolate(frames, every, wishes.reach),
-            _interpolate(frames, every, wishes.lying),
-            wishes.length,
-        )
-        tier = self.tier
+            feet[i], costs[i] = self.configuration.feet(), self._cost()
+        self.touch.set_frame(None)
+        return Sketch(frames, qpos, feet, costs)
+
+    def _plan(self, sketch: Sketch) -> StancePlan:
+        """Plans the footholds near where the feet of a sketch went."""
+        source, tier = self.source, self.tier
+        wishes = sketch.foot_wishes(source)
         if self.nominal_motion is not None:
             # The paper's p_0^F = p̄_0^F: feet that stand on frame 0 stand where the nominal ones do.
-            self.configuration.update(self.nominal_motion[0])
+            first = self.nominal_motion[0]
+            self.configuration.update(first)
             start = foot_wishes(self.configuration.feet()[None])
             standing = np.logical_and.accumulate(tier == ANCHORED)
-            first = self.nominal_motion[0]
             wishes.tips[standing] = np.broadcast_to(start.tips, wishes.tips.shape)[standing]
             turn = start.headings - wishes.headings[:1]
             same = start.headings - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
             wishes.headings[standing] = np.broadcast_to(same, tier.shape)[standing]
-        return plan_stance(tier, wishes, self.human_feet, source.fps, self.options.stance), first
+        return plan_stance(tier, wishes, self.human_feet, source.fps, self.options.stance)

@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 
 from omni_envs.retargeting import RetargetOptions, deformation_energy, retarget
-from omni_envs.retargeting.clip_program import ClipProgram, motion_steps, moved
+from omni_envs.retargeting.clip_program import ClipProgram
 from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.interior_point import solve_clip_qp
 from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.stance_plan import ANCHORED, stance_tiers
+from omni_envs.retargeting.tangents import motion_steps, moved
 from omni_envs.robots import G1
 
 OPTIONS = RetargetOptions(contact_weight=0.0)

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from omni_envs.retargeting import RetargetOptions, retarget
-from omni_envs.retargeting.clip_program import ClipProgram, motion_steps, moved
+from omni_envs.retargeting.clip_program import ClipProgram
 from omni_envs.retargeting.detour import led_around
+from omni_envs.retargeting.tangents import motion_steps, moved
 from omni_envs.robots import G1
 
 OPTIONS = RetargetOptions(contact_weight=0.0)

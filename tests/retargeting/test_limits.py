@@ -44,6 +44,25 @@ def test_speed_is_counted_from_the_previous_frame_not_the_iterate(configuration)
     assert np.isinf(limit.bounds(configuration)[1]).all()
 
 
+def test_the_nearest_configuration_within_the_speed_limit(configuration):
+    limit, goal = StepVelocityLimit(G1, 30.0, 1.0), G1.default_qpos.copy()
+    goal[7] += 2.0
+    goal[8] += 1e-3
+    assert limit.nearest(configuration, goal) is goal
+    limit.set_previous(G1.default_qpos)
+    q = limit.nearest(configuration, goal)
+    np.testing.assert_allclose(q[7] - G1.default_qpos[7], G1.velocity_limits[0] / 30, rtol=1e-5)
+    np.testing.assert_allclose(q[8:], goal[8:], atol=1e-12)
+
+
+def test_without_limit_on_depth_only_the_robot_itself_is_kept_apart(configuration):
+    q = G1.default_qpos.copy()
+    q[2] -= 0.1
+    configuration.update(q)
+    assert row_violations(ContactLimit(0.0).rows(configuration))[2] > 0.05
+    assert row_violations(ContactLimit(np.inf).rows(configuration))[2] == 0.0
+
+
 def test_contact_rows_predict_distances(configuration):
     limit, rng = ContactLimit(0.0), np.random.default_rng(0)
     q = G1.default_qpos.copy()

