@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated
 
@@ -46,14 +47,17 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         Exit status: 0 done, 1 could not do what was asked, 2 wrong usage (raised by the parser).
     """
-    command = tyro.cli(
-        Command,
-        prog="omni-envs",
-        args=arguments,
-        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-    )
     try:
+        command = tyro.cli(
+            Command,
+            prog="omni-envs",
+            args=arguments,
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+        )
         command.run()
+        sys.stdout.flush()
+    except BrokenPipeError:  # `omni-envs … | head` has read enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OmniEnvsError as error:
         print(f"omni-envs: {error}", file=sys.stderr)
         return 1
