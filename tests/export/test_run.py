@@ -1,6 +1,8 @@
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
@@ -16,6 +18,7 @@ from omni_envs.errors import (
     UnknownNameError,
 )
 from omni_envs.export import PROFILES, closed_loop, export_run
+from omni_envs.training.config import TrainConfig
 from omni_envs.training.network_policy import NetworkPolicy, find_checkpoint, load_actor
 from omni_envs.training.onnx_policy import OnnxPolicy
 from omni_envs.training.recipes import RECIPES
@@ -99,14 +102,27 @@ def test_a_file_is_proved_and_described(run):
 
 
 def test_a_file_that_acts_otherwise_than_the_network_is_refused(run):
-    from omni_envs.training.config import TrainConfig
-
     file = OnnxPolicy(export_run(run)["path"])
     actor = load_actor(find_checkpoint(run))
     with torch.no_grad():
         actor.output.bias += 0.5
     with pytest.raises(InvalidDataError, match="return in closed loop"):
         closed_loop.closed_loop(TrainConfig.load(run), NetworkPolicy(actor), file)
+
+
+@pytest.mark.parametrize(("rounded", "passes"), [(10.006, True), (10.004, False)])
+def test_a_file_may_differ_as_last_digits_do(monkeypatch, torso_run, tmp_path, rounded, passes):
+    """A return of 10 that the file misses by 0.05, and the rounded network by some 0.005."""
+    returns = iter([10.05, 10.0, rounded])
+    monkeypatch.setattr(
+        closed_loop, "play", lambda *_, **__: SimpleNamespace(returns=np.array([next(returns)]))
+    )
+    config, file = TrainConfig.load(torso_run), SimpleNamespace(path=tmp_path / "policy.onnx")
+    if passes:
+        assert closed_loop.closed_loop(config, None, file).network_return == 10.0
+    else:
+        with pytest.raises(InvalidDataError, match="closed loop"):
+            closed_loop.closed_loop(config, None, file)
 
 
 def test_a_file_that_fails_its_proof_does_not_stay(run, tmp_path, monkeypatch):
