@@ -21,8 +21,6 @@ FOLDER = Path(__file__).parents[1] / "policies"
 POLICIES = sorted(p for p in FOLDER.glob("*") if p.is_dir())
 SECONDS = 3.0
 LEAST = 0.8
-SHORT = {"g1_box_carry": "79.5 % of 1000 with everything randomized: off-centre boxes tip over"}
-"""Published short of that, by name and why. The test fails when one is not short any more."""
 
 pytestmark = pytest.mark.parametrize("folder", POLICIES, ids=lambda p: p.name)
 
@@ -39,9 +37,7 @@ def test_the_card_is_about_the_evaluation(folder):
     assert str(Path.home()) not in card and "/tmp" not in (folder / "config.json").read_text()
 
 
-def test_it_succeeds_often_enough(folder, request):
-    if folder.name in SHORT:
-        request.applymarker(pytest.mark.xfail(strict=True, reason=SHORT[folder.name]))
+def test_it_succeeds_often_enough(folder):
     figures = json.loads((folder / "evaluation.json").read_text())
     assert figures["success_rate"] >= LEAST
     assert figures["carried_rate"] is None or figures["carried_rate"] >= LEAST

@@ -64,6 +64,11 @@ class FrameSolver:
         self.solver = solver
         self.options = options
 
+    def cost(self) -> float:
+        """Value of all tasks where the configuration is."""
+        models = (task.quadratic(self.configuration) for task in self.tasks)
+        return sum(model.value for model in models if model is not None)
+
     def solve(
         self,
         q: np.ndarray,

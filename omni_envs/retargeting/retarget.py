@@ -340,12 +340,12 @@ class _Retargeter:
             The better result; the configuration is there.
         """
         options = self.options
-        before = self._cost() + _FORBIDDEN * max(caught.violations)
+        before = self.solver.cost() + _FORBIDDEN * max(caught.violations)
         start = pose if self.velocity is None else self.velocity.nearest(self.configuration, pose)
         freed = self.solver.solve(
             start, options.iterations, options.trust_region, options.convergence
         )
-        if self._cost() + _FORBIDDEN * max(freed.violations) < _BETTER * before:
+        if self.solver.cost() + _FORBIDDEN * max(freed.violations) < _BETTER * before:
             return replace(freed, iterations=caught.iterations + freed.iterations)
         self.configuration.update(caught.q)
         return caught
