@@ -11,6 +11,8 @@ On every frame t (OmniRetarget, arXiv 2509.26633, eq. 3-4):
                |q - q_{t-1}| ≤ v_max Δt           ``joint_limits``
                p_foot(q) = p_foot(stance start)   ``stance_limit``
                ‖dq‖ ≤ ε on each step              ``solver``
+
+Before, ``sketch`` finds where the feet shall stand; frames that are caught start from it again.
 """
 
 from __future__ import annotations

@@ -44,12 +44,11 @@ class Sketch:
 
     def pose(self, t: int) -> np.ndarray:
         """(nq,) configuration of frame t."""
-        k = int(np.clip(np.searchsorted(self.frames, t), 1, max(len(self.frames) - 1, 1)))
-        if len(self.frames) == 1:
+        k = int(np.searchsorted(self.frames, t))
+        if k == 0:
             return self.qpos[0]
-        start, end = self.frames[k - 1], self.frames[k]
-        way = difference(self.qpos[k - 1 : k], self.qpos[k : k + 1])
-        return moved(self.qpos[k - 1 : k], (t - start) / (end - start) * way)[0]
+        (start, end), (before, after) = self.frames[k - 1 : k + 1], self.qpos[k - 1 : k + 1, None]
+        return moved(before, (t - start) / (end - start) * difference(before, after))[0]
 
     def catches(self, t: int, cost: float) -> bool:
         """Whether a frame costs so much more than here that it must be caught somewhere."""
