@@ -63,7 +63,7 @@ class ContactTask(CostTask):
         """
         if not self._active:
             return None
-        nearest = [link.nearest(configuration, place) for link, place in self._active]
+        nearest = self._nearest(configuration)
         bodies = np.array([body for body, *_ in nearest])
         gaps = np.array([gap for *_, gap, _ in nearest])
         roots = np.array([root for *_, root in nearest])
@@ -75,6 +75,19 @@ class ContactTask(CostTask):
         weights = self._weight * np.repeat(self._ramp * share, 3)
         H, g, _ = kernels.weighted_squares(J, -gaps.ravel(), weights)
         return Quadratic(H, g, self._weight * float(self._ramp @ losses))
+
+    def value(self, configuration: Kinematics) -> float:
+        """Returns the cost alone, which needs no Jacobians."""
+        if not self._active:
+            return 0.0
+        gaps = np.array([gap for *_, gap, _ in self._nearest(configuration)])
+        return self._weight * float(self._ramp @ pull(np.linalg.norm(gaps, axis=1))[1])
+
+    def _nearest(
+        self, configuration: Kinematics
+    ) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+        """``_Link.nearest`` of every link that touches."""
+        return [link.nearest(configuration, place) for link, place in self._active]
 
 
 def pull(distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -66,8 +66,7 @@ class FrameSolver:
 
     def cost(self) -> float:
         """Value of all tasks where the configuration is."""
-        models = (task.quadratic(self.configuration) for task in self.tasks)
-        return sum(model.value for model in models if model is not None)
+        return step_model(self.configuration, self.tasks)[2]
 
     def solve(
         self,

@@ -52,7 +52,10 @@ class StepVelocityLimit(BoundLimit):
         return back - self._step, back + self._step
 
     def nearest(self, configuration: Kinematics, q: np.ndarray) -> np.ndarray:
-        """Returns the (nq,) configuration nearest to ``q`` that the limit allows."""
+        """Returns the (nq,) configuration nearest to ``q`` that the limit allows.
+
+        ``configuration`` moves to the previous frame.
+        """
         if self._previous is None:
             return q
         configuration.update(self._previous)

@@ -327,9 +327,8 @@ class _Retargeter:
 
     def _cost(self) -> float:
         """Value of mesh and contacts."""
-        contacts = self.touch.quadratic(self.configuration)
         energy = self.mesh.energy(self.configuration)
-        return 0.5 * self.options.laplacian_weight * energy + (contacts.value if contacts else 0.0)
+        return 0.5 * self.options.laplacian_weight * energy + self.touch.value(self.configuration)
 
     def _freed(self, pose: np.ndarray, caught: FrameResult) -> FrameResult:
         """Solves a frame from another pose, as near to that as speed limits let it start.
@@ -361,8 +360,9 @@ class _Retargeter:
         for i, t in enumerate(frames):
             self._place(t)
             self.touch.set_frame(t)
-            self.configuration.update(first)
-            if i > 0:
+            if i == 0:
+                self.configuration.update(first)
+            else:
                 self.smoothness.set_target(qpos[i - 1])
                 radius = (t - frames[i - 1]) * options.trust_region
                 qpos[i] = self.through_walls.solve(

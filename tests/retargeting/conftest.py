@@ -14,6 +14,7 @@ from omni_envs.demonstrations import (
 )
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.retargeting.clip_qp import Band, ClipQP
+from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.robots import G1, SIDES
 
 
@@ -148,3 +149,20 @@ def _dense_clip_qp(qp: ClipQP) -> tuple[np.ndarray, np.ndarray]:
         rows[t, :, t] = qp.A[t]
     blocks += [part.reshape(-1, frames, n) for part in (change, rows, pairs)]
     return hessian.reshape(frames * n, -1), np.concatenate(blocks).reshape(-1, frames * n)
+
+
+@pytest.fixture(scope="module")
+def configuration(grasp) -> Kinematics:
+    """The G1 beside the box, on frame 50 of the grasp."""
+    configuration = Kinematics(G1, grasp.scene)
+    configuration.place_object(grasp.object_poses[50])
+    return configuration
+
+
+@pytest.fixture(scope="module")
+def q(grasp) -> np.ndarray:
+    """A pose near the box there."""
+    q = G1.default_qpos.copy()
+    q[:3] = grasp.keypoints[50, 0]
+    q[7:] += np.random.default_rng(0).normal(scale=0.1, size=29)
+    return q

@@ -9,7 +9,6 @@ from omni_envs.retargeting.contact_task import ContactTask
 from omni_envs.retargeting.foothold_task import FootholdTask
 from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.interaction_mesh_task import InteractionMeshTask
-from omni_envs.retargeting.kinematics import Kinematics
 from omni_envs.retargeting.nominal_task import NominalTask, nominal_weights
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
@@ -17,21 +16,6 @@ from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.stance_plan import StancePlan
 from omni_envs.robots import G1
-
-
-@pytest.fixture(scope="module")
-def configuration(grasp):
-    configuration = Kinematics(G1, grasp.scene)
-    configuration.place_object(grasp.object_poses[50])
-    return configuration
-
-
-@pytest.fixture(scope="module")
-def q(grasp):
-    q = G1.default_qpos.copy()
-    q[:3] = grasp.keypoints[50, 0]
-    q[7:] += np.random.default_rng(0).normal(scale=0.1, size=29)
-    return q
 
 
 def foothold_task():
@@ -120,50 +104,3 @@ def test_tasks_that_are_off(grasp, configuration, q):
     for task in (touch, near):
         assert task.quadratic(configuration) is None
         assert not task.compute_qp_objective(configuration).H.any()
-
-
-def test_contact_gap_is_to_the_surface_of_the_link(grasp, configuration, q):
-    from omni_envs.retargeting.contact_task import _Link
-
-    configuration.update(q)
-    link = _Link(configuration, "left_hand")
-    far = configuration.data.body("left_wrist_yaw_link").xpos.copy()
-    far[2] += 1.0
-    _, point, gap, _ = link.nearest(configuration, far)
-    np.testing.assert_allclose(point + gap, far)
-    assert 0.8 < np.linalg.norm(gap) < 1.0
-    palm = configuration.data.geom("left_palm_hull").xpos
-    _, _, inside, _ = link.nearest(configuration, palm)
-    assert not inside.any()
-
-
-@pytest.mark.parametrize("way", [(0.0, 0.0, 0.3), (0.3, 0.1, 0.0), (0.2, -0.3, 0.25)])
-def test_contact_curvature_is_that_of_the_gap(configuration, q, way):
-    """½‖gap‖² of a moving place has the curvature rootᵀ root, be it off face, edge or corner."""
-    from omni_envs.retargeting.contact_task import _Link
-
-    configuration.update(q)
-    link = _Link(configuration, "left_hand")
-    place = configuration.data.geom("left_palm_hull").xpos + way
-    _, _, gap, root = link.nearest(configuration, place)
-    assert np.linalg.norm(gap) > 0.05
-    np.testing.assert_allclose(root @ gap, gap, atol=1e-12)
-
-    def half_square(step):
-        return 0.5 * np.sum(link.nearest(configuration, place + step)[2] ** 2)
-
-    h, eye = 1e-4, np.eye(3)
-    curvature = [
-        [
-            (
-                half_square(h * (a + b))
-                - half_square(h * (a - b))
-                - half_square(h * (b - a))
-                + half_square(-h * (a + b))
-            )
-            / (4 * h * h)
-            for b in eye
-        ]
-        for a in eye
-    ]
-    np.testing.assert_allclose(root.T @ root, curvature, atol=1e-4)
