@@ -38,29 +38,49 @@ def led_around(
     if depths.max(initial=0.0) <= _DEEP:
         return qpos
     allowed = np.maximum(program.depths(before, 0, frames), _DEEP)
-    for attempt in range(_ATTEMPTS + 1):
+    for _ in range(_ATTEMPTS):
         deep = np.flatnonzero(depths > allowed)
         if not len(deep):
-            break
-        far = np.abs(np.arange(frames)[:, None] - deep).min(axis=1)
-        back = np.clip((far - 1.0) / _BLEND, 0.0, 1.0)
-        share = 0.5 - 0.5 * np.cos(np.pi * back)
-        qpos = moved(before, share[:, None] * difference(before, qpos))
-        if attempt == _ATTEMPTS:
-            break
-        for start, stop in _around(deep, frames):
-            for radius in _SHORT:
-                boxes = radius * np.maximum(share[start:stop], _NARROW)
-                # Limits on the steps from and to the frames beyond are not in the program.
-                if start > 0:
-                    boxes[0] = _STILL
-                if stop < frames:
-                    boxes[-1] = _STILL
-                solution = solve_clip_qp(program.linearise(qpos, start, stop, boxes), tolerance)
-                qpos = qpos.copy()
-                qpos[start:stop] = moved(qpos[start:stop], solution.x)
-            depths[start:stop] = program.depths(qpos, start, stop)
+            return qpos
+        qpos = smoothed_again(program, before, qpos, tolerance, deep)
+        depths = program.depths(qpos, 0, frames)
+    return led_back(before, qpos, np.flatnonzero(depths > allowed))
+
+
+def led_back(before: np.ndarray, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """(T, nq) a smoothed motion that goes back to the one before on (N,) frames and about them."""
+    share = _share(len(qpos), frames)
+    return moved(before, share[:, None] * difference(before, qpos))
+
+
+def smoothed_again(
+    program: ClipProgram, before: np.ndarray, qpos: np.ndarray, tolerance: float, frames: np.ndarray
+) -> np.ndarray:
+    """(T, nq) a smoothed motion led back on (N,) ascending frames, and smoothed with short steps.
+
+    See ``led_around``.
+    """
+    share, qpos = _share(len(qpos), frames), led_back(before, qpos, frames)
+    for start, stop in _around(frames, len(qpos)):
+        for radius in _SHORT:
+            boxes = radius * np.maximum(share[start:stop], _NARROW)
+            # Limits on the steps from and to the frames beyond are not in the program.
+            if start > 0:
+                boxes[0] = _STILL
+            if stop < len(qpos):
+                boxes[-1] = _STILL
+            solution = solve_clip_qp(program.linearise(qpos, start, stop, boxes), tolerance)
+            qpos[start:stop] = moved(qpos[start:stop], solution.x)
     return qpos
+
+
+def _share(count: int, frames: np.ndarray) -> np.ndarray:
+    """(T,) how much of the smoothing stays: 0 on (N,) frames, 1 far from them."""
+    if not len(frames):
+        return np.ones(count)
+    far = np.abs(np.arange(count)[:, None] - frames).min(axis=1)
+    back = np.clip((far - 1.0) / _BLEND, 0.0, 1.0)
+    return 0.5 - 0.5 * np.cos(np.pi * back)
 
 
 def _around(deep: np.ndarray, frames: int) -> Iterator[tuple[int, int]]:

@@ -90,7 +90,8 @@ def stance_windows(
             centre[run, foot, TIP], slack[run, foot, TIP] = _tip_window(places[:, TIP], options)
             hearts, pivot = places[:, HEART], human.pivots[run, foot]
             cuts = np.zeros(0, int)
-            if np.linalg.norm(hearts - hearts[0], axis=1).max() > _FLAT:
+            arm = feet[run, foot, HEART] - feet[run, foot, TIP]
+            if np.linalg.norm(arm - arm[0], axis=1).max() > _FLAT:
                 cuts = np.flatnonzero(np.diff(pivot)) + 1
             for part in np.split(np.arange(len(pivot)), cuts):
                 # Where the tip may be from where it was at the start of the part.

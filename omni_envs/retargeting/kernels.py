@@ -171,51 +171,6 @@ def contact_sides(
 
 
 @_compiled
-def nearest_box(
-    xpos: Array, xmat: Array, geoms: Array, half: Array, radius: Array, place: Array
-) -> tuple[int, Array, float, Array]:
-    """The box, grown by a radius, that is nearest to a place.
-
-    Args:
-        xpos: Places of all geoms.
-        xmat: Rotations of all geoms.
-        geoms: (G,) the boxes' geoms.
-        half: (G, 3) half extents.
-        radius: (G,).
-        place: (3,).
-
-    Returns:
-        Its index in ``geoms``, the (3,) way from the box that is not grown to the place, its
-        length, and the (3, 3) projector onto the axes on which the place is beyond the box: along
-        the others the nearest point slides as the box moves.
-    """
-    best, least, length = 0, np.inf, 0.0
-    local, away, beyond = np.empty(3), np.zeros(3), np.zeros((3, 3))
-    outside = np.zeros(3, np.bool_)
-    for i in range(len(geoms)):
-        R, centre = xmat[geoms[i]], xpos[geoms[i]]
-        square = 0.0
-        for j in range(3):
-            along = 0.0
-            for k in range(3):
-                along += R[3 * k + j] * (place[k] - centre[k])
-            local[j] = along - min(max(along, -half[i, j]), half[i, j])
-            outside[j] = abs(along) >= half[i, j]
-            square += local[j] * local[j]
-        distance = np.sqrt(square)
-        if distance - radius[i] < least:
-            best, least, length = i, distance - radius[i], distance
-            for k in range(3):
-                away[k] = R[3 * k] * local[0] + R[3 * k + 1] * local[1] + R[3 * k + 2] * local[2]
-                for m in range(3):
-                    beyond[k, m] = 0.0
-                    for j in range(3):
-                        if outside[j]:
-                            beyond[k, m] += R[3 * k + j] * R[3 * m + j]
-    return best, away, length, beyond
-
-
-@_compiled
 def reduced_energies(
     adjacency: Array, source: Array, target: Array, keypoints: int
 ) -> tuple[Array, Array, Array]:

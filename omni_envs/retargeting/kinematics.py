@@ -85,6 +85,11 @@ class Kinematics(mink.Configuration):
         metric[3:6] = 0.25
         return metric
 
+    @cached_property
+    def foot_width(self) -> float:
+        """Width of the wider foot, m."""
+        return max(_width(self.model, foot) for foot in self.robot.feet.values())
+
     def place_object(self, pose: np.ndarray) -> None:
         """Sets the (7,) object pose; takes effect at the next ``update``."""
         self.data.mocap_pos[0], self.data.mocap_quat[0] = pose[:3], pose[3:]
@@ -207,6 +212,22 @@ def _foot_points(foot: Foot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     forward = tip - heart
     left = np.array([-forward[1], forward[0], 0.0]) / np.hypot(forward[0], forward[1])
     return tip, heart, tip + 0.1 * left
+
+
+def _width(model: mujoco.MjModel, foot: Foot) -> float:
+    """Extent of the collision geoms of a foot across its sole, m."""
+    tip, heart, left = np.array(_foot_points(foot))
+    across = (left - tip) / np.linalg.norm(left - tip)
+    ends = []
+    for geom in np.flatnonzero(model.geom_bodyid == model.body(foot.body).id):
+        if model.geom_contype[geom] or model.geom_conaffinity[geom]:
+            matrix, centre = np.empty(9), model.geom_aabb[geom, :3]
+            mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
+            turn = matrix.reshape(3, 3)
+            middle = across @ (model.geom_pos[geom] + turn @ centre - heart)
+            half = np.abs(across @ turn) @ model.geom_aabb[geom, 3:]
+            ends += [middle - half, middle + half]
+    return float(np.ptp(ends))
 
 
 @lru_cache(maxsize=8)

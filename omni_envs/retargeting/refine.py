@@ -18,22 +18,23 @@ import numpy as np
 from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import ProgressCallback
 from omni_envs.retargeting.clip_program import ClipProgram
-from omni_envs.retargeting.detour import led_around
+from omni_envs.retargeting.clip_restoration import (
+    RestoredClip,
+    relaxation_tolerance,
+    restore_clip,
+)
+from omni_envs.retargeting.detour import led_around, led_back, smoothed_again
 from omni_envs.retargeting.interior_point import solve_clip_qp
-from omni_envs.retargeting.joint_limits import JointLimit, StepVelocityLimit
-from omni_envs.retargeting.limits import BoundLimit
-from omni_envs.retargeting.options import RetargetOptions
-from omni_envs.retargeting.qp import step_bounds
-from omni_envs.retargeting.restoration import restore
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
-from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.retargeting.tangents import moved
-from omni_envs.robots import KEYPOINTS, Robot, get_robot
+from omni_envs.robots import get_robot
 
 # Frames solved at once, and frames on either side that are solved with them and thrown away: the
 # influence of a frame has faded there.
 _WINDOW, _CONTEXT = 320, 24
-_RELAXED = 2e-4
+# How often a motion that cannot be restored is mended; frames about the first of those, and how far
+# another first one is from it.
+_ATTEMPTS, _ABOUT, _APART = 6, 8, 40
 _EARLY = 10.0  # rounds before the last are solved to this many times the tolerance
 
 
@@ -72,7 +73,8 @@ def refine(
     """Smooths a retargeted motion under the constraints it was made with.
 
     Stance is kept relative to the motion given: feet stay where it put them. Where that motion
-    violates a constraint so may the result, and its record says by how much.
+    violates a constraint so may the result, and its record says by how much; elsewhere the result
+    goes back to that motion sooner than violate one.
 
     Args:
         retargeted: Result of ``retarget``.
@@ -107,18 +109,39 @@ def refine(
         qpos = moved(qpos, x)
     qpos = led_around(program, retargeted.qpos, qpos, options.tolerance)
 
-    restoration = _Restoration(program, robot, retargeted.options)
-    qpos = qpos.copy()
-    steps, violations = np.empty(frames, int), np.empty((frames, 3))
-    keypoints = np.empty((frames, len(KEYPOINTS), 3))
-    for t in range(frames):
-        qpos[t], steps[t], violations[t] = restoration.restore(t, qpos[t])
-        keypoints[t] = program.configuration.keypoints()
-        if progress is not None:
-            progress(total - frames + t + 1, total)
-    energy = program.mesh.energy(keypoints)
-    record = _record(retargeted, energy, steps, violations, perf_counter() - begin)
-    return replace(retargeted, qpos=qpos, frames=record)
+    restored = _restored(program, retargeted, qpos, options, progress)
+    return replace(
+        retargeted,
+        qpos=restored.qpos,
+        frames=_record(retargeted, restored, perf_counter() - begin),
+    )
+
+
+def _restored(
+    program: ClipProgram,
+    before: Retargeted,
+    qpos: np.ndarray,
+    options: RefineOptions,
+    progress: ProgressCallback | None,
+) -> RestoredClip:
+    """Restores a smoothed motion; where that fails, the motion gives way, not its constraints."""
+    best = latest = restore_clip(program, before.options, qpos, progress, len(options.radii))
+    for attempt in range(_ATTEMPTS):
+        forced = np.flatnonzero(latest.relaxed & ~before.frames.relaxed)
+        if not len(forced):
+            break
+        # One missed landing spoils the whole stance after it.
+        first = forced[np.diff(forced, prepend=-_APART) >= _APART]
+        about = np.unique(first[:, None] + np.arange(-_ABOUT, _ABOUT + 1))
+        about = about[(about >= 0) & (about < len(qpos))]
+        if attempt == 0:
+            qpos = smoothed_again(program, before.qpos, qpos, options.tolerance, about)
+        else:
+            qpos = led_back(before.qpos, qpos, about)
+        latest = restore_clip(program, before.options, qpos)
+        if latest.relaxed.sum() < best.relaxed.sum():
+            best = latest
+    return best
 
 
 def _windows(frames: int) -> Iterator[tuple[int, int, slice]]:
@@ -129,59 +152,17 @@ def _windows(frames: int) -> Iterator[tuple[int, int, slice]]:
         yield max(0, first - _CONTEXT), min(frames, last + _CONTEXT), slice(first, last)
 
 
-def _record(
-    before: Retargeted,
-    energy: np.ndarray,
-    steps: np.ndarray,
-    violations: np.ndarray,
-    seconds: float,
-) -> SolveRecord:
+def _record(before: Retargeted, restored: RestoredClip, seconds: float) -> SolveRecord:
     old = before.frames
-    current = {name: violations[:, i] for i, name in enumerate(RELAXATIONS)}
+    current = {name: restored.violations[:, i] for i, name in enumerate(RELAXATIONS)}
     if "stance" in old.violations:
         # Stance is kept relative to the motion before: what that missed is still missed.
         current["stance"] = np.maximum(current["stance"], old.violations["stance"])
-    tolerance = max(_RELAXED, before.options.restoration_tolerance)
+    tolerance = relaxation_tolerance(before.options)
     return SolveRecord(
-        energy=energy,
-        iterations=old.iterations + steps,
+        energy=restored.energy,
+        iterations=old.iterations + restored.steps,
         relaxed=np.any(np.stack(list(current.values())) > tolerance, axis=0),
         violations=current,
-        seconds=old.seconds + seconds / len(energy),
+        seconds=old.seconds + seconds / len(old.seconds),
     )
-
-
-class _Restoration:
-    """Shortest steps of successive frames onto the true constraints."""
-
-    def __init__(self, program: ClipProgram, robot: Robot, options: RetargetOptions) -> None:
-        self._program, self._options = program, options
-        self._bounds: list[BoundLimit] = [JointLimit(robot)]
-        self._velocity: StepVelocityLimit | None = None
-        if options.velocity_limits is not None:
-            self._velocity = StepVelocityLimit(robot, program.source.fps, options.velocity_limits)
-            self._bounds.append(self._velocity)
-        self._previous: np.ndarray | None = None
-
-    def restore(self, t: int, q: np.ndarray) -> tuple[np.ndarray, int, tuple[float, ...]]:
-        """Restores frame t after frame t - 1.
-
-        Returns:
-            The configuration, quadratic programs solved, and what remains violated, in the order of
-            ``RELAXATIONS``.
-        """
-        program, configuration = self._program, self._program.configuration
-        program.place(t)
-        configuration.update(q)
-        program.stance.hold(t)
-        if self._velocity is not None:
-            self._velocity.set_previous(self._previous)
-        # Limits of single joints need no program.
-        inside = np.clip(0.0, *step_bounds(configuration, self._bounds))
-        if inside.any():
-            configuration.update(configuration.step(inside))
-        limits = [program.contact, program.stance]
-        restored = restore(configuration, self._bounds, limits, solve_daqp, self._options)
-        self._previous = configuration.data.qpos.copy()
-        program.stance.record(configuration)
-        return self._previous, restored.steps, restored.violations

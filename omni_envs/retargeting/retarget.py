@@ -62,6 +62,7 @@ _RELAXED = 2e-4
 _AHEAD = 0.9
 _BETTER = 0.98  # of the cost: what a second start must come below
 _FORBIDDEN = 1e3  # cost of a violation, 1/m
+_COARSE = 10.0  # times the convergence: for a sketch
 _FIRST = 1e-5  # convergence on the first frame: whatever is left there drifts into the motion
 
 
@@ -254,8 +255,9 @@ class _Retargeter:
                 options.convergence if t else _FIRST,
                 fallback=previous,
             )
-            if t > 0 and sketch.catches(t, self._cost()):
-                result = self._freed(sketch.pose(t), result)
+            drawn = sketch.drawn(t)
+            if t > 0 and drawn is not None and sketch.catches(drawn, self._cost()):
+                result = self._freed(sketch.qpos[drawn], result)
             stance.record(self.configuration, t)
             previous = result.q
             qpos[t], iterations[t], violations[t] = result.q, result.iterations, result.violations
@@ -366,7 +368,11 @@ class _Retargeter:
                 self.smoothness.set_target(qpos[i - 1])
                 radius = (t - frames[i - 1]) * options.trust_region
                 qpos[i] = self.through_walls.solve(
-                    qpos[i - 1], options.iterations, radius, options.convergence, restore=False
+                    qpos[i - 1],
+                    options.iterations,
+                    radius,
+                    _COARSE * options.convergence,
+                    restore=False,
                 ).q
             feet[i], costs[i] = self.configuration.feet(), self._cost()
         self.touch.set_frame(None)
@@ -386,4 +392,11 @@ class _Retargeter:
             turn = start.headings - wishes.headings[:1]
             same = start.headings - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
             wishes.headings[standing] = np.broadcast_to(same, tier.shape)[standing]
-        return plan_stance(tier, wishes, self.human_feet, source.fps, self.options.stance)
+        return plan_stance(
+            tier,
+            wishes,
+            self.configuration.foot_width,
+            self.human_feet,
+            source.fps,
+            self.options.stance,
+        )

@@ -13,7 +13,6 @@ import numpy as np
 
 from omni_envs.demonstrations.source_motion import SourceMotion
 from omni_envs.retargeting.stance_plan import FootWishes, foot_wishes
-from omni_envs.retargeting.tangents import difference, moved
 from omni_envs.robots import KEYPOINTS, SIDES
 
 _STRIDE = 5
@@ -42,17 +41,14 @@ class Sketch:
     feet: np.ndarray
     costs: np.ndarray
 
-    def pose(self, t: int) -> np.ndarray:
-        """(nq,) configuration of frame t."""
+    def drawn(self, t: int) -> int | None:
+        """Number of frame t among the drawn ones, None where it is not."""
         k = int(np.searchsorted(self.frames, t))
-        if k == 0:
-            return self.qpos[0]
-        (start, end), (before, after) = self.frames[k - 1 : k + 1], self.qpos[k - 1 : k + 1, None]
-        return moved(before, (t - start) / (end - start) * difference(before, after))[0]
+        return k if self.frames[k] == t else None
 
-    def catches(self, t: int, cost: float) -> bool:
-        """Whether a frame costs so much more than here that it must be caught somewhere."""
-        return cost > _CAUGHT * np.interp(t, self.frames, self.costs) + _AT_LEAST
+    def catches(self, k: int, cost: float) -> bool:
+        """Whether drawn frame k costs so much more than here that it must be caught somewhere."""
+        return bool(cost > _CAUGHT * self.costs[k] + _AT_LEAST)
 
     def foot_wishes(self, source: SourceMotion) -> FootWishes:
         """Where the feet would be on every frame of the source."""

@@ -8,6 +8,7 @@ and the plan keeps
 * the toe tip of an *anchored* foot in one place, and by ``StanceLimit`` the whole sole, but while
   the human rolls or turns the foot on its toes and the robot would have to do so far;
 * the toe tip of a *loose* foot below a speed;
+* soles beside each other;
 * consecutive footholds within reach of each other.
 """
 
@@ -20,6 +21,7 @@ import daqp
 import numpy as np
 
 from omni_envs.demonstrations.source_motion import SourceMotion
+from omni_envs.retargeting.foot_room import make_room
 from omni_envs.retargeting.human_feet import HumanFeet
 from omni_envs.retargeting.options import StanceOptions
 
@@ -37,10 +39,12 @@ _FLAT = 3e-3  # m: a stance whose arm from tip to heart changes less, seen from 
 # sole) by more than this while it stands does so while the human's foot pivots, the toe tip in its
 # place: to stand flat and still would contort the robot (bear crawl up a slope: a quarter more
 # energy, three times its maximum). A foot that lies on its side or back, as in a crawl, has no
-# weight on its sole and is held whole at little cost.
+# weight on its sole and is held whole at little cost. A foot that comes down from its toes to stand
+# flat, as of one who gets up from the knees, rolls in any case.
 _TURN, _ROLL = 1.5, 0.3
 _UPRIGHT = 0.8  # least horizontal part of the unit axis to the left of an upright foot
 _LYING = 0.9  # least horizontal part of the unit axis to the left with which a foot has a heading
+_LEVEL = 0.05  # m: feet that stand on heights further apart do not meet
 # Pull of the planned heading on a landing foot: frames before landing that feel it, and its weight.
 _APPROACH, _PULL = 8, 50.0
 
@@ -123,13 +127,19 @@ def stance_tiers(source: SourceMotion, options: StanceOptions) -> np.ndarray:
 
 
 def plan_stance(
-    tier: np.ndarray, wishes: FootWishes, human: HumanFeet, fps: float, options: StanceOptions
+    tier: np.ndarray,
+    wishes: FootWishes,
+    width: float,
+    human: HumanFeet,
+    fps: float,
+    options: StanceOptions,
 ) -> StancePlan:
     """Chooses footholds near the wishes and the windows that lead to them.
 
     Args:
         tier: (T, 2) tier of each foot on each frame.
         wishes: Where the feet would be without stance.
+        width: Of the feet, m.
         human: What the human's feet do in these tiers.
         fps: Frames per second.
         options: Settings.
@@ -145,13 +155,13 @@ def plan_stance(
     arms, arm_weights = np.zeros((*tier.shape, 2)), np.zeros((*tier.shape, 2))
     turns, rolls = np.zeros(tier.shape, bool), np.zeros(tier.shape, bool)
     rise = np.full(tier.shape, np.inf)
-    for foot in range(2):
-        runs = _runs(tier[:, foot] == ANCHORED)
+    stances = [_runs(tier[:, foot] == ANCHORED) for foot in range(2)]
+    middles = _middles(stances, wishes, width, human)
+    for foot, runs in enumerate(stances):
         if not runs:
             continue
         for axis in range(2):
-            means = [wishes.tips[start:end, foot, axis].mean() for start, end in runs]
-            holds = _footholds(runs, np.array(means), tip_step[:, foot])
+            holds = _footholds(runs, middles[foot][:, axis], tip_step[:, foot])
             tips[:, foot, axis] = _look_ahead(runs, holds, len(tier))
         tip_slack[:, foot] = _funnel(runs, detour[:, foot], options.tolerance)
         for start, end in runs:
@@ -160,7 +170,13 @@ def plan_stance(
             rise[start:end, foot] = human.rise[start:end, foot] if lying >= _UPRIGHT else np.inf
             pivots = human.pivots[start:end, foot] & (lying >= _UPRIGHT)
             turning, rolling = np.ptp(wish) > _TURN, np.ptp(reach) > _ROLL * wishes.length[foot]
-            turns[start:end, foot], rolls[start:end, foot] = pivots & turning, pivots & rolling
+            flat = human.flat[start:end, foot]
+            settled = np.logical_or.accumulate(flat & ~pivots)
+            down = ~settled if flat.any() else np.zeros(len(flat), bool)
+            turns[start:end, foot], rolls[start:end, foot] = (
+                pivots & turning,
+                pivots & (rolling | down),
+            )
             if lying < _LYING:
                 continue
             first, turned, rolled = (
@@ -198,6 +214,28 @@ def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
     """[start, end) of every run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _middles(
+    stances: list[list[tuple[int, int]]], wishes: FootWishes, width: float, human: HumanFeet
+) -> list[np.ndarray]:
+    """(runs, 2) wished toe tip of every interval of either foot, with room for both soles."""
+    runs = [(foot, start, end) for foot in range(2) for start, end in stances[foot]]
+    tips = np.array([wishes.tips[start:end, foot].mean(axis=0) for foot, start, end in runs])
+    headings = [np.median(wishes.headings[start:end, foot]) for foot, start, end in runs]
+    upright = [wishes.lying[start:end, foot].min() >= _UPRIGHT for foot, start, end in runs]
+    heights = [human.support[start, foot] for foot, start, _ in runs]
+    pairs = [
+        (i, j)
+        for i, j in itertools.product(range(len(stances[0])), range(len(stances[0]), len(runs)))
+        if max(runs[i][1], runs[j][1]) < min(runs[i][2], runs[j][2])
+        and upright[i]
+        and upright[j]
+        and np.isclose(heights[i], heights[j], rtol=0.0, atol=_LEVEL)
+    ]
+    lengths = np.array([2.0 * wishes.length[foot] for foot, *_ in runs])
+    tips = make_room(tips.reshape(-1, 2), np.array(headings), lengths, width, pairs)
+    return np.split(tips, [len(stances[0])])
 
 
 def _footholds(runs: list[tuple[int, int]], wish: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -79,6 +79,16 @@ def test_a_foot_that_rolled_with_the_human_is_still_before_and_after():
     assert windows.slack[5, 0, HEART].max() > OPTIONS.tolerance
 
 
+def test_a_heel_that_comes_down_lets_the_foot_roll_though_it_hardly_moves_from_above():
+    feet = standing()
+    feet[:4, 0, HEART, 2] += 0.03
+    feet[4:, 0, HEART, :2] += [0.003, 0.0]
+    windows = stance_windows(feet, tiers(), human(pivots=slice(3, 6)), FPS, OPTIONS)
+    assert all(inside(windows, feet, t).all() for t in (0, 2, 7, 9))
+    assert windows.slack[[2, 8], 0, HEART].max() <= OPTIONS.tolerance
+    assert windows.slack[4, 0, HEART].max() > OPTIONS.tolerance
+
+
 def test_on_a_slope_windows_lie_in_the_slope():
     feet, normal = standing(), np.array([-np.sin(0.3), 0.0, np.cos(0.3)])
     windows = stance_windows(feet, tiers(), human(slope=0.3), FPS, OPTIONS)

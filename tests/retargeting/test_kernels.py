@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from omni_envs.retargeting import kernels
-from omni_envs.rotations import exp, rotate
 
 rng = np.random.default_rng(0)
 
@@ -44,27 +43,6 @@ def test_contact_sides():
     np.testing.assert_array_equal(bodies, [[0, 2], [1, 2]])
     np.testing.assert_array_equal(own, [False, True])
     np.testing.assert_allclose(lower, [0.009, -0.02])
-
-
-def test_nearest_box():
-    half, radius = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.1]]), np.array([0.0, 0.05])
-    centres, turns = rng.normal(size=(2, 3)), exp(rng.normal(size=(2, 3)))
-    matrices = np.stack([rotate(turns, np.tile(axis, (2, 1))) for axis in np.eye(3)], axis=-1)
-    geoms = np.arange(2)
-    for i in range(2):
-        way = rotate(turns[i], np.array([0.0, 0.0, 0.07]))
-        place = centres[i] + rotate(turns[i], [0.0, 0.0, half[i, 2]]) + way
-        found, away, length, beyond = kernels.nearest_box(
-            centres, matrices.reshape(2, 9), geoms, half, radius, place
-        )
-        assert found == i and length == pytest.approx(0.07)
-        axis = rotate(turns[i], np.array([0.0, 0.0, 1.0]))
-        # A box of no width is always beside the place.
-        expected = np.eye(3) if i else np.outer(axis, axis)
-        np.testing.assert_allclose(beyond, expected, atol=1e-12)
-        np.testing.assert_allclose(away, way, atol=1e-12)
-    inside = kernels.nearest_box(centres, matrices.reshape(2, 9), geoms, half, radius, centres[0])
-    assert inside[0] == 0 and inside[2] == 0.0 and not inside[1].any() and not inside[3].any()
 
 
 def test_farthest_points():

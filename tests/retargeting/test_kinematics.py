@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from omni_envs.retargeting.kinematics import Kinematics
-from omni_envs.robots import G1
+from omni_envs.robots import G1, get_robot
 from omni_envs.scenes import Scene
 
 
@@ -66,3 +66,8 @@ def test_heart_of_the_sole_is_behind_the_tip_and_left_is_left(configuration):
 def test_difference_undoes_step(configuration):
     dq = np.random.default_rng(2).normal(scale=0.1, size=configuration.model.nv)
     np.testing.assert_allclose(configuration.difference(configuration.step(dq)), dq, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "width"), [("g1", 0.062), ("h1", 0.03), ("t1", 0.094)])
+def test_foot_width_is_that_of_the_collision_geoms(name, width):
+    assert Kinematics(get_robot(name), Scene()).foot_width == pytest.approx(width, abs=1e-3)

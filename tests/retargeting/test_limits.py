@@ -118,7 +118,7 @@ def stand(configuration, frames=6, pivots=False, rise=0.0, slope=0.0, reach=0.0)
         np.full((frames, 2), np.inf),
         np.zeros((frames, 2), bool),
     )
-    return StanceLimit(plan_stance(tier, wishes, human, 30.0, options), options)
+    return StanceLimit(plan_stance(tier, wishes, 0.03, human, 30.0, options), options)
 
 
 def violation_after(limit, configuration, **moved):
@@ -173,7 +173,7 @@ def test_the_way_to_a_foothold_is_no_constraint(configuration):
     human = HumanFeet(flat > 0, flat, axes, flat + np.inf, flat > 0)
     tier = np.full((frames, 2), ANCHORED)
     tier[:3] = FREE
-    limit = StanceLimit(plan_stance(tier, wishes, human, 30.0, options), options)
+    limit = StanceLimit(plan_stance(tier, wishes, 0.03, human, 30.0, options), options)
     for t in range(3):
         limit.hold(t)
         limit.record(configuration, t)

@@ -143,6 +143,23 @@ def test_without_stance_and_speed_limits(short):
     )
 
 
+def test_a_motion_that_cannot_be_restored_goes_back(short, monkeypatch):
+    module = sys.modules["omni_envs.retargeting.refine"]  # the package's attribute is the function
+    solve = module.solve_clip_qp
+
+    def torn(*arguments):
+        solution = solve(*arguments)
+        solution.x[20:22, 2] += 0.4  # into the air, off both feet
+        return solution
+
+    monkeypatch.setattr(module, "solve_clip_qp", torn)
+    after = refine(short)
+    assert not after.frames.relaxed.any()
+    assert np.abs(after.qpos[:, 2] - short.qpos[:, 2]).max() < 0.05
+    monkeypatch.setattr(module, "_ATTEMPTS", 0)
+    assert refine(short).frames.relaxed[20:22].any()
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_very_short_clips(short, cut, frames):
     source = cut(short.source, 0, frames)

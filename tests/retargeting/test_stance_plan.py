@@ -12,7 +12,7 @@ from omni_envs.retargeting.stance_plan import (
     stance_tiers,
 )
 
-OPTIONS = StanceOptions()
+OPTIONS, WIDTH = StanceOptions(), 0.06
 
 
 def wishes(tips, headings=None, reach=None, lying=1.0):
@@ -36,7 +36,7 @@ def human(frames, pivots=slice(0, 0)):
 
 
 def plan_of(tier, wished, pivots=slice(0, 0)):
-    return plan_stance(tier, wished, human(len(tier), pivots), 30.0, OPTIONS)
+    return plan_stance(tier, wished, WIDTH, human(len(tier), pivots), 30.0, OPTIONS)
 
 
 def tiers(left):
@@ -79,6 +79,31 @@ def test_far_turns_and_rolls_are_let_while_the_human_pivots():
     for wished in (far_turn, far_roll):
         held = plan_of(tier, wished)
         assert not held.turns.any() and not held.rolls.any()
+
+
+def test_a_foot_that_comes_down_from_its_toes_rolls_until_it_is_flat():
+    tier, wished = tiers(np.full(30, ANCHORED)), wishes(np.zeros((30, 2)))
+    feet = human(30, slice(5, 12))
+    feet.pivots[20:25] = True  # and once more later
+    feet.flat[10:] = True
+    plan = plan_stance(tier, wished, WIDTH, feet, 30.0, OPTIONS)
+    np.testing.assert_array_equal(np.flatnonzero(plan.rolls[:, 0]), np.arange(5, 12))
+    feet.flat[:] = False  # one that never stands flat does not
+    assert not plan_stance(tier, wished, WIDTH, feet, 30.0, OPTIONS).rolls.any()
+
+
+def test_footholds_leave_room_for_both_feet():
+    tier = np.full((30, 2), ANCHORED)
+    tier[:5, 0] = tier[25:, 1] = FREE
+    tips = wishes(np.zeros((30, 2)))
+    tips.tips[:, 1, 1] = -0.02
+    feet = human(30)
+    feet.support[:] = 0.0
+    plan = plan_stance(tier, tips, WIDTH, feet, 30.0, OPTIONS)
+    np.testing.assert_allclose(plan.tips[15], [[0.0, 0.02], [0.0, -0.04]], atol=1e-4)
+    feet.support[:, 0] = 0.3  # one stands on a step
+    apart = plan_stance(tier, tips, WIDTH, feet, 30.0, OPTIONS)
+    np.testing.assert_allclose(apart.tips[15], [[0.0, 0.0], [0.0, -0.02]])
 
 
 def test_a_foot_that_lies_may_rise():
