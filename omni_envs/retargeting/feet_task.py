@@ -24,6 +24,8 @@ class FeetTask(CostTask):
         """Returns the Gauss-Newton model of the cost."""
         if not len(self._weights):
             return None
-        error = self._select @ configuration.feet().ravel() - self._targets
-        J = self._select @ configuration.feet_jacobians().reshape(18, -1)
-        return Quadratic(*kernels.weighted_squares(J, error, self._weights))
+        values, jacobian = configuration.feet().ravel(), configuration.feet_jacobians()
+        jacobian = jacobian.reshape(18, -1)
+        return Quadratic(
+            *kernels.selected_squares(self._select, values, jacobian, self._targets, self._weights)
+        )

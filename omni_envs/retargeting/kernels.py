@@ -132,6 +132,46 @@ def weighted_squares(
 
 
 @_compiled
+def selected_squares(
+    select: Array, values: Array, jacobian: Array, targets: Array, weights: Array
+) -> tuple[Array, Array, float]:
+    """H, g and value of ½ Σ w (s·x - target)² over N rows s of (M,) values x; rows are sparse.
+
+    Args:
+        select: (N, M).
+        values: (M,) x.
+        jacobian: (M, nv) of x.
+        targets: (N,).
+        weights: (N,) w.
+    """
+    (count, size), nv = select.shape, jacobian.shape[1]
+    rows, residual = np.zeros((count, nv)), -targets
+    for i in range(count):
+        for m in range(size):
+            factor = select[i, m]
+            if factor != 0.0:
+                residual[i] += factor * values[m]
+                for v in range(nv):
+                    rows[i, v] += factor * jacobian[m, v]
+    return weighted_squares(rows, residual, weights)
+
+
+@_compiled
+def lowest_points(points: Array, normals: Array) -> tuple[Array, Array]:
+    """(F,) least heights along (F, 3) normals of (F, K, 3) points, and the (F, 3) points."""
+    count, size = points.shape[:2]
+    heights, lowest = np.full(count, np.inf), np.zeros((count, 3))
+    for f in range(count):
+        for k in range(size):
+            height = 0.0
+            for d in range(3):
+                height += normals[f, d] * points[f, k, d]
+            if height < heights[f]:
+                heights[f], lowest[f] = height, points[f, k]
+    return heights, lowest
+
+
+@_compiled
 def worst_violations(lower: Array, upper: Array, kind: Array, kinds: int) -> Array:
     """(kinds,) largest violation of lower ≤ 0 ≤ upper by kind, 0 for none."""
     worst = np.zeros(kinds)

@@ -144,21 +144,24 @@ class Kinematics(mink.Configuration):
         """(2, K, 3) world sole points, left foot first."""
         return self.positions(self._soles).reshape(2, -1, 3)
 
-    def toe_heights(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heights of both feet along (2, 3) normals of what they stand on.
+    def toe_heights(self, normals: np.ndarray) -> np.ndarray:
+        """(2,) heights of both feet along (2, 3) normals of what they stand on, m.
 
-        That of a foot is the height of its lowest sole point before the heart: the heel may hang
-        over an edge, and rise when the foot rolls onto its toes.
-
-        Returns:
-            (2,) heights over the plane through the origin, m, and their (2, nv) gradients.
+        That of a foot is the height over the plane through the origin of its lowest sole point
+        before the heart: the heel may hang over an edge, and rise when the foot rolls onto its
+        toes.
         """
-        toes = self.positions(self._toes).reshape(2, -1, 3)
-        heights = (toes @ normals[:, :, None])[..., 0]
-        lowest = np.argmin(heights, axis=1)
-        bodies = self._toes.bodies[:: toes.shape[1]]
-        jacobian = self.body_jacobians(bodies, toes[[0, 1], lowest])
-        return heights[[0, 1], lowest], np.einsum("fd,dfn->fn", normals, jacobian)
+        return self._lowest_toes(normals)[0]
+
+    def toe_height_gradients(self, normals: np.ndarray) -> np.ndarray:
+        """(2, nv) gradients of what ``toe_heights`` returns."""
+        _, points = self._lowest_toes(normals)
+        bodies = np.zeros((2, 2), int)
+        bodies[:, 1] = self._toes.bodies[:: len(self._toes.bodies) // 2]
+        return self.contact_rows(bodies, points, normals)
+
+    def _lowest_toes(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return kernels.lowest_points(self.positions(self._toes).reshape(2, -1, 3), normals)
 
     def feet(self) -> np.ndarray:
         """(2, 3, 3) toe tip, and arms from there to the heart of the sole and to the left.

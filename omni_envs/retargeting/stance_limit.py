@@ -33,13 +33,14 @@ class StanceLimit(RowLimit):
         self._plan, self._options = plan, options
         self._tips, self._arms, self._forward = np.zeros((3, 2, 3))
         self._lowest, self._ceiling = np.zeros(2), np.full(2, np.inf)
+        self._supports = np.cross(plan.axes[:, :, 0], plan.axes[:, :, 1])
 
     def hold(self, t: int) -> None:
         """Chooses frame t of the plan. ``record`` must have been called on frame t - 1."""
         plan, stays = self._plan, self._stays(t)
         self._ceiling[:] = np.inf
-        self._normals = np.cross(plan.axes[t, :, 0], plan.axes[t, :, 1])
-        self._windows: list[tuple[np.ndarray, float, float, int]] = []
+        self._normals = self._supports[t]
+        self._windows: list[tuple[int, int, np.ndarray, float, float, int]] = []
         tolerance = self._options.heart_tolerance
         for foot in range(2):
             slack, tip = plan.tip_slack[t, foot], self._tips[foot]
@@ -71,8 +72,11 @@ class StanceLimit(RowLimit):
                 arm = float(along @ self._arms[foot])
                 self._hold(foot, HEART, along, arm - tolerance, arm + tolerance)
         if self._windows:
-            columns = zip(*self._windows, strict=True)
-            self._select, self._lower, self._upper, self._kind = map(np.array, columns)
+            feet, points, directions, *bounds = map(np.array, zip(*self._windows, strict=True))
+            self._lower, self._upper, self._kind = bounds
+            select = np.zeros((len(feet), 2, 3, 3))
+            select[np.arange(len(feet)), feet, points] = directions
+            self._select = select.reshape(-1, 18)
 
     def _hold_level(self, foot: int, low: np.ndarray, high: np.ndarray, kind: int) -> None:
         """Holds the tip of a foot within the (2,) lowest and highest x and y."""
@@ -89,14 +93,12 @@ class StanceLimit(RowLimit):
         kind: int = STANCE,
     ) -> None:
         """Holds the component of a point of a foot along a direction within [low, high]."""
-        select = np.zeros((2, 3, 3))
-        select[foot, point] = direction
-        self._windows.append((select.ravel(), low, high, kind))
+        self._windows.append((foot, point, direction, low, high, kind))
 
     def record(self, configuration: Kinematics, t: int) -> None:
         """Remembers where frame t has put the feet, except those that it held in their place."""
         plan, feet, stays = self._plan, configuration.feet(), self._stays(t)
-        heights, _ = configuration.toe_heights(self._normals)
+        heights = configuration.toe_heights(self._normals)
         for foot in range(2):
             tip, hold = feet[foot, TIP], plan.tips[t, foot]
             turns, rolls = plan.turns[t, foot], plan.rolls[t, foot]
@@ -135,9 +137,10 @@ class StanceLimit(RowLimit):
         beside = np.abs(configuration.feet()[:, TIP, :2] - self._tips[:, :2]).max(axis=1)
         down = np.isfinite(self._ceiling) & (beside < _TORN)
         if down.any():
-            heights, gradients = configuration.toe_heights(self._normals)
-            A = np.concatenate([A, gradients[down]])
-            lower = np.append(lower, np.full(down.sum(), -np.inf))
-            upper = np.append(upper, (self._ceiling - heights)[down])
-            kind = np.append(kind, np.full(down.sum(), FOOTING))
+            room = (self._ceiling - configuration.toe_heights(self._normals))[down]
+            gradients = configuration.toe_height_gradients(self._normals)[down]
+            A = np.concatenate([A, gradients])
+            lower = np.concatenate([lower, np.full(len(room), -np.inf)])
+            upper = np.concatenate([upper, room])
+            kind = np.concatenate([kind, np.full(len(room), FOOTING)])
         return Rows(A, lower, upper, kind)

@@ -45,6 +45,25 @@ def test_contact_sides():
     np.testing.assert_allclose(lower, [0.009, -0.02])
 
 
+def test_selected_squares():
+    select, values, jacobian = rng.normal(size=(4, 6)), rng.normal(size=6), rng.normal(size=(6, 5))
+    select[rng.random(select.shape) < 0.5] = 0.0
+    targets, weights = rng.normal(size=4), rng.uniform(1.0, 2.0, 4)
+    H, g, value = kernels.selected_squares(select, values, jacobian, targets, weights)
+    rows, error = select @ jacobian, select @ values - targets
+    np.testing.assert_allclose(H, rows.T @ (weights[:, None] * rows), atol=1e-12)
+    np.testing.assert_allclose(g, rows.T @ (weights * error), atol=1e-12)
+    assert value == pytest.approx(0.5 * weights @ error**2)
+
+
+def test_lowest_points():
+    points, normals = rng.normal(size=(2, 7, 3)), rng.normal(size=(2, 3))
+    heights, lowest = kernels.lowest_points(points, normals)
+    expected = np.einsum("fkd,fd->fk", points, normals)
+    np.testing.assert_allclose(heights, expected.min(axis=1))
+    np.testing.assert_array_equal(lowest, points[[0, 1], expected.argmin(axis=1)])
+
+
 def test_farthest_points():
     points, stretch = rng.normal(size=(40, 3)), rng.uniform(1.0, 2.0, 40)
     chosen = kernels.farthest_points(points, stretch, 12).tolist()

@@ -46,6 +46,12 @@ def test_feet_jacobians(configuration):
     np.testing.assert_allclose(configuration.feet_jacobians(), expected, atol=1e-7)
 
 
+def test_toe_height_gradients(configuration):
+    normals = np.array([[0.0, 0.0, 1.0], [0.3, 0.1, 0.9]])
+    moved = differentiate(configuration, lambda moving: moving.toe_heights(normals))
+    np.testing.assert_allclose(configuration.toe_height_gradients(normals), moved, atol=1e-7)
+
+
 def test_contact_rows_are_relative_jacobians_along_the_normal(configuration):
     bodies = np.array([configuration.model.body(f"left_{n}_link").id for n in ("knee", "elbow")])
     point, normal = np.array([[0.1, 0.2, 0.3]]), np.array([[0.0, 0.6, 0.8]])

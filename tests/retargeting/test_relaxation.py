@@ -42,7 +42,9 @@ def struck(grasp):
     """A block 1 m thick strikes the robot at 30 m/s: none is out of its way in time."""
     block = SceneObject("block", (Part(Box((0.5, 2.0, 1.0))),), mass=1.0)
     pelvis = grasp.keypoints[30, KEYPOINTS.index("pelvis")]
-    poses = np.tile([*(pelvis + [1.5, 0.0, 0.0]), 1.0, 0.0, 0.0, 0.0], (len(grasp.keypoints), 1))
+    poses = np.tile(
+        [*np.add(pelvis, (1.5, 0.0, 0.0)), 1.0, 0.0, 0.0, 0.0], (len(grasp.keypoints), 1)
+    )
     poses[30, 0] -= 1.0
     return replace(standing(grasp, poses), scene=Scene(object=block), contact_points={})
 
