@@ -41,10 +41,10 @@ def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Connectivity:
-    """Who is whose neighbour in every source frame. Independent of robot, target and overall scale.
+    """Who is whose neighbour in every source frame. Independent of target and robot motion.
 
     Attributes:
-        points: (T, V, 3) source points that were connected, divided by the source's scale.
+        points: (T, V, 3) source points that were connected.
         bits: (T, V, ⌈V/8⌉) adjacency matrices, packed.
     """
 
@@ -81,9 +81,13 @@ _connectivities: list[Connectivity] = []
 
 
 def _connectivity(points: np.ndarray) -> Connectivity:
-    """The connectivity of (T, V, 3) unscaled points: a recent one where the points are the same."""
+    """The connectivity of (T, V, 3) points: a recent one where the points are the same.
+
+    To the bit: points on a circle are connected one way or the other by the last digit, and what a
+    process made before must not decide it.
+    """
     for known in _connectivities:
-        if known.points.shape == points.shape and np.allclose(known.points, points, 0, 1e-9):
+        if np.array_equal(known.points, points):
             return known
     _connectivities.insert(0, connect(points))
     del _connectivities[8:]
@@ -113,7 +117,6 @@ class InteractionMesh:
         points: SurfacePoints,
         source_poses: np.ndarray | None = None,
         target_poses: np.ndarray | None = None,
-        scale: float = 1.0,
     ) -> InteractionMesh:
         """Connects a source and reduces its energy about a target.
 
@@ -122,7 +125,6 @@ class InteractionMesh:
             points: Surface points of source and target.
             source_poses: (T, 7) frame of the source points; None is the world.
             target_poses: (T, 7) frame of the target points; None is the world.
-            scale: Scale of the source. Sources that differ in scale only share one connectivity.
         """
         frames = len(keypoints)
         local = keypoints
@@ -131,7 +133,7 @@ class InteractionMesh:
             local = (keypoints - source_poses[:, None, :3]) @ rotation
         surface = np.broadcast_to(points.source, (frames, *points.source.shape[-2:]))
         vertices = np.concatenate([local, surface], axis=1)
-        connectivity = _connectivity(vertices / scale)
+        connectivity = _connectivity(vertices)
         target = points.target.reshape(-1, *points.target.shape[-2:])
         moment, linear, rest = kernels.reduced_energies(connectivity.bits, vertices, target, _K)
         factor = np.swapaxes(np.linalg.cholesky(moment + _RIDGE * np.eye(_K)), 1, 2)
@@ -152,7 +154,6 @@ class InteractionMesh:
             surface_points(source, count, ground),
             source.source_object_poses,
             poses if source.mesh_object_poses is None else source.mesh_object_poses,
-            source.scale,
         )
 
     def energy(self, keypoints: np.ndarray) -> np.ndarray:

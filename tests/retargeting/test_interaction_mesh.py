@@ -66,18 +66,18 @@ def test_energy_moves_with_the_object(grasp):
     )
 
 
-def test_connectivity_is_reused_at_another_scale(grasp, monkeypatch):
+def test_connectivity_is_reused_for_another_target(grasp, monkeypatch):
     from omni_envs.retargeting import interaction_mesh
 
+    made = []
+    monkeypatch.setattr(interaction_mesh, "connect", lambda p: made.append(p) or connect(p))
+    monkeypatch.setattr(interaction_mesh, "_connectivities", [])
     InteractionMesh.of(grasp, 40)
-    monkeypatch.setattr(interaction_mesh, "connect", lambda points: pytest.fail("connected again"))
-    smaller = replace(
-        grasp,
-        scale=0.9 * grasp.scale,
-        keypoints=0.9 * grasp.keypoints,
-        source_object_poses=grasp.source_object_poses * ([0.9] * 3 + [1.0] * 4),
-    )
-    InteractionMesh.of(smaller, 40)
+    InteractionMesh.of(replace(grasp, object_poses=grasp.object_poses + 0.1), 40)
+    assert len(made) == 1
+    # Not for points that differ by rounding: a motion must not depend on what was made before it.
+    InteractionMesh.of(replace(grasp, keypoints=grasp.keypoints * (1.0 + 1e-15)), 40)
+    assert len(made) == 2
 
 
 def test_flat_and_coincident_points_still_connect():
