@@ -41,8 +41,10 @@ from omni_envs.retargeting.nominal_task import NominalTask, check_nominal, nomin
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
+from omni_envs.retargeting.restoration import KINDS
 from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
 from omni_envs.retargeting.sketch import Sketch, sketched_frames
+from omni_envs.retargeting.softness import softness
 from omni_envs.retargeting.sole_task import SoleTask
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.retargeting.stance_limit import StanceLimit
@@ -61,7 +63,9 @@ from omni_envs.robots import Robot
 _RELAXED = 2e-4
 _AHEAD = 0.9
 _BETTER = 0.98  # of the cost: what a second start must come below
-_FORBIDDEN = 1e3  # cost of a violation, 1/m
+_INSIDE = 1e-3  # m: a robot left deeper in itself or the surroundings starts a second time, too
+# Cost of violations of stance, self-collision and non-penetration, 1/m.
+_FORBIDDEN = 100.0 * softness(np.array(KINDS))[1]
 _COARSE = 10.0  # times the convergence: for a sketch
 _FIRST = 1e-5  # convergence on the first frame: whatever is left there drifts into the motion
 
@@ -255,6 +259,8 @@ class _Retargeter:
                 options.convergence if t else _FIRST,
                 fallback=previous,
             )
+            if max(result.violations[1:]) > _INSIDE:
+                result = self._freed(previous, result)
             drawn = sketch.drawn(t)
             if t > 0 and drawn is not None and sketch.catches(drawn, self._cost()):
                 result = self._freed(sketch.qpos[drawn], result)
@@ -332,23 +338,28 @@ class _Retargeter:
         energy = self.mesh.energy(self.configuration)
         return 0.5 * self.options.laplacian_weight * energy + self.touch.value(self.configuration)
 
+    def _value(self, result: FrameResult) -> float:
+        """Cost of a result, where the configuration is, and of what it violates."""
+        excess = np.array(result.violations) - self.options.restoration_tolerance
+        return self.solver.cost() + float(_FORBIDDEN @ np.maximum(excess, 0.0))
+
     def _freed(self, pose: np.ndarray, caught: FrameResult) -> FrameResult:
         """Solves a frame from another pose, as near to that as speed limits let it start.
 
         Args:
-            pose: (nq,) where a robot that nothing stops would be.
+            pose: (nq,) where it was a frame before, or where a robot that nothing stops would be.
             caught: The result to beat.
 
         Returns:
             The better result; the configuration is there.
         """
         options = self.options
-        before = self.solver.cost() + _FORBIDDEN * max(caught.violations)
+        before = self._value(caught)
         start = pose if self.velocity is None else self.velocity.nearest(self.configuration, pose)
         freed = self.solver.solve(
             start, options.iterations, options.trust_region, options.convergence
         )
-        if self.solver.cost() + _FORBIDDEN * max(freed.violations) < _BETTER * before:
+        if self._value(freed) < _BETTER * before:
             return replace(freed, iterations=caught.iterations + freed.iterations)
         self.configuration.update(caught.q)
         return caught

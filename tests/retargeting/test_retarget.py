@@ -131,8 +131,8 @@ def test_oscillating_object_against_planted_feet(grasp):
     stance = {mode: np.ones_like(flags) for mode, flags in grasp.stance.items()}
     motion = stressed(retarget(replace(grasp, object_poses=poses, stance=stance), G1))
     found = report(replace(grasp, object_poses=poses, stance=stance), motion)
-    # Stance gives way first: what penetrates is little and told.
-    assert found["penetration_max_m"] < 0.02
+    # Stance gives way first.
+    assert found["penetration_max_m"] < 2e-3
 
 
 def test_four_times_playback(box_carry):
@@ -257,7 +257,6 @@ def test_official_energy_is_reproduced(shared, largebox):
         SurfacePoints(points * largebox.scale, points),
         largebox.object_poses,
         largebox.object_poses,
-        largebox.scale,
     )
     run = shared / "anchors" / "official_runs" / "sub3_largebox_003_original.npz"
     qpos = np.load(run, allow_pickle=False)["qpos"][:, :36]
