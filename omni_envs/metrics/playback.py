@@ -170,6 +170,8 @@ def _compile(robot: Robot, scene: Scene) -> mujoco.MjModel:
         geom.margin = REACH if geom.parent.name in ("world", OBJECT) else 0.0
         geom.gap = 0.0
     spec.memory = _MEMORY
+    # Several contacts of a pair come with distances that are up to 2 mm off; one is exact.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
     for first, second in resting_pairs(robot):
         spec.add_exclude(bodyname1=first, bodyname2=second)
     return spec.compile()

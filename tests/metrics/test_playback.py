@@ -1,12 +1,13 @@
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from omni_envs.errors import InvalidDataError
 from omni_envs.metrics.playback import TARGETS, play
 from omni_envs.robots import G1, KEYPOINTS
 from omni_envs.robots.self_collision import resting_pairs
-from omni_envs.scenes import Box, Part, Scene, SceneObject, Terrain, build_spec
+from omni_envs.scenes import Box, ConvexMesh, Part, Scene, SceneObject, Terrain, build_spec
 
 BOX = SceneObject("box", (Part(Box((0.2, 0.2, 0.2))),))
 
@@ -22,9 +23,9 @@ def random_poses(count: int, seed: int = 0) -> np.ndarray:
     return qpos
 
 
-def brute_force(qpos: np.ndarray, pose: np.ndarray) -> dict[str, float]:
+def brute_force(qpos: np.ndarray, pose: np.ndarray, thing: SceneObject = BOX) -> dict[str, float]:
     """Depth by the distance of every single pair of geoms."""
-    spec = build_spec(G1, Scene(object=BOX), looks=False)
+    spec = build_spec(G1, Scene(object=thing), looks=False)
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
@@ -65,6 +66,20 @@ def test_depths_agree_with_the_distance_of_every_pair(seed):
     assert expected["object"] > 0 and expected["ground"] > 0
     for name, target in (("object", 0), ("ground", TARGETS.index("ground")), ("self", -1)):
         assert deepest(playback, target) == pytest.approx(expected[name], abs=1e-3), name
+
+
+def test_depths_in_a_scanned_box_are_exact():
+    """On faces that are not quite flat several contacts of a pair may be millimetres off."""
+    mesh = trimesh.creation.box(extents=(0.5, 0.4, 0.3)).subdivide().subdivide().subdivide()
+    noise = np.random.default_rng(0).normal(scale=5e-4, size=mesh.vertices.shape)
+    hull = trimesh.Trimesh(mesh.vertices + noise).convex_hull
+    scan = SceneObject("scan", (Part(ConvexMesh(hull.vertices, hull.faces)),))
+    pose = np.array([0.2, 0.1, 0.1, 0.8, 0.6, 0.0, 0.0])
+    for seed in range(12):
+        qpos = random_poses(1, seed)
+        playback = play(G1, Scene(object=scan), 50.0, qpos, pose[None])
+        expected = brute_force(qpos[0], pose, scan)["object"]
+        assert deepest(playback, 0) == pytest.approx(expected, abs=1e-4)
 
 
 def test_normals_point_from_the_target_to_the_robot(standing):
