@@ -24,8 +24,8 @@ def pull(distance: float) -> tuple[float, float, float]:
     a = ``FULL``; its force a stays up to b = ``FADES`` and falls with a (b/g)² beyond.
 
     Returns:
-        Value, slope, and curvature of a parabola in g that lies above the loss (that of g² where ρ
-        is), in d.
+        Value, slope and curvature. Beyond ``FULL`` the curvature is that of the parabola in g that
+        touches the loss and lies above it, as the true one, 0 or less, makes steps overshoot.
     """
     root = np.sqrt(distance * distance + SOFT * SOFT)
     gap = 0.5 * (distance + root) if distance > 0.0 else 0.5 * SOFT * SOFT / (root - distance)
