@@ -48,7 +48,7 @@ def led_around(
 
 
 def led_back(before: np.ndarray, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """(T, nq) a smoothed motion that goes back to the one before on (N,) frames and about them."""
+    """(T, nq) a smoothed motion, led back to the one before on (N,) ascending frames and about."""
     share = _share(len(qpos), frames)
     return moved(before, share[:, None] * difference(before, qpos))
 
@@ -75,10 +75,13 @@ def smoothed_again(
 
 
 def _share(count: int, frames: np.ndarray) -> np.ndarray:
-    """(T,) how much of the smoothing stays: 0 on (N,) frames, 1 far from them."""
+    """(T,) how much of the smoothing stays: 0 on (N,) ascending frames, 1 far from them."""
     if not len(frames):
         return np.ones(count)
-    far = np.abs(np.arange(count)[:, None] - frames).min(axis=1)
+    at = np.arange(count)
+    after = np.searchsorted(frames, at)
+    nearest = frames[np.clip([after - 1, after], 0, len(frames) - 1)]
+    far = np.abs(at - nearest).min(axis=0)
     back = np.clip((far - 1.0) / _BLEND, 0.0, 1.0)
     return 0.5 - 0.5 * np.cos(np.pi * back)
 

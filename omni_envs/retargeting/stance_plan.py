@@ -15,6 +15,7 @@ and the plan keeps
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import daqp
@@ -225,17 +226,31 @@ def _middles(
     headings = [np.median(wishes.headings[start:end, foot]) for foot, start, end in runs]
     upright = [wishes.lying[start:end, foot].min() >= _UPRIGHT for foot, start, end in runs]
     heights = [human.support[start, foot] for foot, start, _ in runs]
+    second = len(stances[0])  # where the right foot's begin
     pairs = [
-        (i, j)
-        for i, j in itertools.product(range(len(stances[0])), range(len(stances[0]), len(runs)))
-        if max(runs[i][1], runs[j][1]) < min(runs[i][2], runs[j][2])
-        and upright[i]
-        and upright[j]
-        and np.isclose(heights[i], heights[j], rtol=0.0, atol=_LEVEL)
+        (i, second + j)
+        for i, j in _overlaps(*stances)
+        if upright[i]
+        and upright[second + j]
+        and np.isclose(heights[i], heights[second + j], rtol=0.0, atol=_LEVEL)
     ]
     lengths = np.array([2.0 * wishes.length[foot] for foot, *_ in runs])
     tips = make_room(tips.reshape(-1, 2), np.array(headings), lengths, width, pairs)
-    return np.split(tips, [len(stances[0])])
+    return np.split(tips, [second])
+
+
+def _overlaps(
+    first: list[tuple[int, int]], second: list[tuple[int, int]]
+) -> Iterator[tuple[int, int]]:
+    """Numbers of all intervals of two ascending lists that have a frame in common."""
+    begin = 0
+    for i, (start, end) in enumerate(first):
+        while begin < len(second) and second[begin][1] <= start:
+            begin += 1
+        for j in range(begin, len(second)):
+            if second[j][0] >= end:
+                break
+            yield i, j
 
 
 def _footholds(runs: list[tuple[int, int]], wish: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@ import pytest
 
 from omni_envs.retargeting import RetargetOptions, retarget
 from omni_envs.retargeting.clip_program import ClipProgram
-from omni_envs.retargeting.detour import led_around
+from omni_envs.retargeting.detour import _share, led_around
 from omni_envs.retargeting.tangents import motion_steps, moved
 from omni_envs.robots import G1
 
@@ -45,3 +45,13 @@ def test_a_limb_moved_into_the_body_gets_out_smoothly(motion, program):
     assert roughness[1] <= roughness[0]
     np.testing.assert_allclose(after[:5], inside[:5], atol=1e-12)
     np.testing.assert_allclose(after[-20:], inside[-20:], atol=1e-12)
+
+
+def test_the_share_of_the_smoothing_falls_to_nothing_on_the_frames():
+    frames = np.array([5, 6, 40])
+    share = _share(60, frames)
+    far = np.abs(np.arange(60)[:, None] - frames).min(axis=1)
+    assert (share[far <= 1] == 0.0).all() and (share[far >= 9] == 1.0).all()
+    order = np.argsort(far, kind="stable")
+    assert (np.diff(share[order]) >= 0.0).all()
+    assert (_share(60, frames[:0]) == 1.0).all()

@@ -8,6 +8,7 @@ from omni_envs.retargeting.stance_plan import (
     FREE,
     LOOSE,
     FootWishes,
+    _overlaps,
     plan_stance,
     stance_tiers,
 )
@@ -104,6 +105,21 @@ def test_footholds_leave_room_for_both_feet():
     feet.support[:, 0] = 0.3  # one stands on a step
     apart = plan_stance(tier, tips, WIDTH, feet, 30.0, OPTIONS)
     np.testing.assert_allclose(apart.tips[15], [[0.0, 0.0], [0.0, -0.02]])
+
+
+def test_overlapping_intervals_are_found():
+    rng = np.random.default_rng(0)
+    first, second = (
+        [(int(a), int(b)) for a, b in np.sort(rng.choice(200, 40, replace=False)).reshape(-1, 2)]
+        for _ in range(2)
+    )
+    expected = [
+        (i, j)
+        for i, a in enumerate(first)
+        for j, b in enumerate(second)
+        if max(a[0], b[0]) < min(a[1], b[1])
+    ]
+    assert len(expected) > 10 and list(_overlaps(first, second)) == expected
 
 
 def test_a_foot_that_lies_may_rise():
