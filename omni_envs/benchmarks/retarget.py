@@ -35,6 +35,8 @@ STAGES = {
     "contact_limit": "collision",
     "solver": "qp",
     "stance_plan": "footholds",
+    "foot_room": "footholds",
+    "sketch": "footholds",
     "frame_solver": "loop",
     "restoration": "restoration",
     "retarget": "loop",

@@ -10,8 +10,7 @@ import numpy as np
 from omni_envs import rotations
 from omni_envs.errors import InvalidDataError
 from omni_envs.robots import KEYPOINTS, SIDES, BodyPoint, Robot
-from omni_envs.robots.self_collision import resting_pairs
-from omni_envs.scenes import GROUND, OBJECT, TERRAIN, Scene, build_spec
+from omni_envs.scenes import GROUND, OBJECT, TERRAIN, Scene, distance_spec
 
 REACH = 0.1
 """Distances between robot and surroundings beyond this are not measured (m)."""
@@ -163,17 +162,11 @@ def play(
 
 
 def _compile(robot: Robot, scene: Scene) -> mujoco.MjModel:
-    spec = build_spec(robot, scene, looks=False)
+    # Robot bodies find each other in penetration only.
+    spec = distance_spec(robot, scene, contact_distance=REACH, self_distance=0.0)
     for geom in spec.geoms:
-        # MuJoCo adds the margins of a pair: the robot's own are 0, so that self pairs show up in
-        # penetration only.
-        geom.margin = REACH if geom.parent.name in ("world", OBJECT) else 0.0
         geom.gap = 0.0
     spec.memory = _MEMORY
-    # Several contacts of a pair come with distances that are up to 2 mm off; one is exact.
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
-    for first, second in resting_pairs(robot):
-        spec.add_exclude(bodyname1=first, bodyname2=second)
     return spec.compile()
 
 

@@ -13,15 +13,9 @@ from omni_envs.retargeting.limits import BoundLimit
 from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.qp import step_bounds
 from omni_envs.retargeting.restoration import restore
+from omni_envs.retargeting.result import relaxation_tolerance
 from omni_envs.retargeting.solver import solve_daqp
 from omni_envs.robots import KEYPOINTS
-
-_RELAXED = 2e-4
-
-
-def relaxation_tolerance(options: RetargetOptions) -> float:
-    """Violation from which on a frame of a refined motion counts as relaxed, m."""
-    return max(_RELAXED, options.restoration_tolerance)
 
 
 @dataclass(frozen=True, eq=False)

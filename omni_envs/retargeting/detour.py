@@ -38,13 +38,15 @@ def led_around(
     if depths.max(initial=0.0) <= _DEEP:
         return qpos
     allowed = np.maximum(program.depths(before, 0, frames), _DEEP)
-    for _ in range(_ATTEMPTS):
+    for attempt in range(_ATTEMPTS + 1):
         deep = np.flatnonzero(depths > allowed)
         if not len(deep):
-            return qpos
+            break
+        if attempt == _ATTEMPTS:
+            return led_back(before, qpos, deep)
         qpos = smoothed_again(program, before, qpos, tolerance, deep)
         depths = program.depths(qpos, 0, frames)
-    return led_back(before, qpos, np.flatnonzero(depths > allowed))
+    return qpos
 
 
 def led_back(before: np.ndarray, qpos: np.ndarray, frames: np.ndarray) -> np.ndarray:

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from omni_envs import rotations
 from omni_envs.retargeting import kernels
 from omni_envs.robots import KEYPOINTS, SIDES, Foot, Robot
-from omni_envs.robots.self_collision import resting_pairs
-from omni_envs.scenes import OBJECT, Scene, build_spec
+from omni_envs.scenes import OBJECT, Scene, distance_spec
 
 
 class Points:
@@ -224,12 +224,10 @@ def _width(model: mujoco.MjModel, foot: Foot) -> float:
     ends = []
     for geom in np.flatnonzero(model.geom_bodyid == model.body(foot.body).id):
         if model.geom_contype[geom] or model.geom_conaffinity[geom]:
-            matrix, centre = np.empty(9), model.geom_aabb[geom, :3]
-            mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
-            turn = matrix.reshape(3, 3)
-            middle = across @ (model.geom_pos[geom] + turn @ centre - heart)
-            half = np.abs(across @ turn) @ model.geom_aabb[geom, 3:]
-            ends += [middle - half, middle + half]
+            centre, half = np.split(model.geom_aabb[geom], 2)
+            axis = rotations.rotate(rotations.conjugate(model.geom_quat[geom]), across)
+            middle = across @ (model.geom_pos[geom] - heart) + axis @ centre
+            ends += [middle - np.abs(axis) @ half, middle + np.abs(axis) @ half]
     return float(np.ptp(ends))
 
 
@@ -237,16 +235,9 @@ def _width(model: mujoco.MjModel, foot: Foot) -> float:
 def _compile(
     robot: Robot, scene: Scene, contact_distance: float, self_distance: float | None
 ) -> mujoco.MjModel:
-    spec = build_spec(robot, scene, looks=False)
-    # MuJoCo adds the margins of a pair. Environment geoms carry what robot geoms do not.
-    robot_margin = 0.0 if self_distance is None else 0.5 * self_distance
-    for geom in spec.geoms:
-        surroundings = geom.parent.name in ("world", OBJECT)
-        geom.margin = contact_distance - robot_margin if surroundings else robot_margin
-        if self_distance is None and not surroundings:
-            geom.conaffinity = 0  # robot geoms no longer meet each other, the surroundings still do
-    # Several contacts per pair come with distances up to 1.2 mm too large; one is exact.
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
-    for first, second in resting_pairs(robot):
-        spec.add_exclude(bodyname1=first, bodyname2=second)
+    spec = distance_spec(robot, scene, contact_distance, self_distance or 0.0)
+    if self_distance is None:
+        for geom in spec.geoms:
+            if geom.parent.name not in ("world", OBJECT):
+                geom.conaffinity = 0  # robot geoms meet the surroundings, but no longer each other
     return spec.compile()

@@ -18,14 +18,15 @@ import numpy as np
 from omni_envs.errors import InvalidOptionError
 from omni_envs.progress import ProgressCallback
 from omni_envs.retargeting.clip_program import ClipProgram
-from omni_envs.retargeting.clip_restoration import (
-    RestoredClip,
-    relaxation_tolerance,
-    restore_clip,
-)
+from omni_envs.retargeting.clip_restoration import RestoredClip, restore_clip
 from omni_envs.retargeting.detour import led_around, led_back, smoothed_again
 from omni_envs.retargeting.interior_point import solve_clip_qp
-from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
+from omni_envs.retargeting.result import (
+    RELAXATIONS,
+    Retargeted,
+    SolveRecord,
+    relaxation_tolerance,
+)
 from omni_envs.retargeting.tangents import moved
 from omni_envs.robots import get_robot
 

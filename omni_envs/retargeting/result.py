@@ -16,6 +16,15 @@ Speed limits would come next, joint limits never: a frame that stays as the last
 so neither can contradict anything, and both hold on every frame even where all others give way.
 """
 
+# Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
+# step.
+_RELAXED = 2e-4
+
+
+def relaxation_tolerance(options: RetargetOptions) -> float:
+    """Violation from which on a frame counts as relaxed, m."""
+    return max(_RELAXED, options.restoration_tolerance)
+
 
 @dataclass(frozen=True, eq=False)
 class SolveRecord:

@@ -42,7 +42,12 @@ from omni_envs.retargeting.options import RetargetOptions
 from omni_envs.retargeting.orientation_task import OrientationTask
 from omni_envs.retargeting.proximal_task import ProximalTask
 from omni_envs.retargeting.restoration import KINDS
-from omni_envs.retargeting.result import RELAXATIONS, Retargeted, SolveRecord
+from omni_envs.retargeting.result import (
+    RELAXATIONS,
+    Retargeted,
+    SolveRecord,
+    relaxation_tolerance,
+)
 from omni_envs.retargeting.sketch import Sketch, sketched_frames
 from omni_envs.retargeting.softness import softness
 from omni_envs.retargeting.sole_task import SoleTask
@@ -58,9 +63,6 @@ from omni_envs.retargeting.stance_plan import (
 from omni_envs.retargeting.tasks import CostTask
 from omni_envs.robots import Robot
 
-# Stance windows are wider than what counts as relaxed by this much: numerical slack of the last
-# step.
-_RELAXED = 2e-4
 _AHEAD = 0.9
 _BETTER = 0.98  # of the cost: what a second start must come below
 _INSIDE = 1e-3  # m: a robot left deeper in itself or the surroundings starts a second time, too
@@ -271,7 +273,7 @@ class _Retargeter:
             seconds[t] = perf_counter() - start
             if progress is not None:
                 progress(t + 1, frames)
-        tolerance = max(_RELAXED, self.options.restoration_tolerance)
+        tolerance = relaxation_tolerance(options)
         record = SolveRecord(
             energy=energy,
             iterations=iterations,

@@ -173,11 +173,9 @@ def plan_stance(
             turning, rolling = np.ptp(wish) > _TURN, np.ptp(reach) > _ROLL * wishes.length[foot]
             flat = human.flat[start:end, foot]
             settled = np.logical_or.accumulate(flat & ~pivots)
-            down = ~settled if flat.any() else np.zeros(len(flat), bool)
-            turns[start:end, foot], rolls[start:end, foot] = (
-                pivots & turning,
-                pivots & (rolling | down),
-            )
+            comes_down = flat.any() & ~settled
+            turns[start:end, foot] = pivots & turning
+            rolls[start:end, foot] = pivots & (rolling | comes_down)
             if lying < _LYING:
                 continue
             first, turned, rolled = (

@@ -1,6 +1,7 @@
 """What stands around the robot, and the one builder that turns it into a MuJoCo model."""
 
 from omni_envs.scenes.build import GROUND, OBJECT, TERRAIN, PhysicsOptions, build_spec
+from omni_envs.scenes.distances import distance_spec
 from omni_envs.scenes.heightfield import HeightField
 from omni_envs.scenes.scene import Scene, SceneObject, Terrain
 from omni_envs.scenes.shapes import Box, ConvexMesh, Part, Shape, load_convex_parts
@@ -26,6 +27,7 @@ __all__ = [
     "Shape",
     "Terrain",
     "build_spec",
+    "distance_spec",
     "load_convex_parts",
     "mesh_terrain",
     "platform",
